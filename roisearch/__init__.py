@@ -1,0 +1,1 @@
+"""The search itself: belief, regions, planners. Pure: arrays in, decisions out."""

@@ -1,0 +1,1 @@
+"""The process beside the flight controller: area, link, mission, HTTP door."""

@@ -1,0 +1,1 @@
+"""What stands in for the world: mock autopilot, target, detector, trials."""

@@ -1,0 +1,36 @@
+"""`roisearch-sim`: the command line of the simulated world. Each command lives in its own module."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+COMMANDS: dict[str, tuple[str, str]] = {
+    # command: (module with main(arguments) -> exit code, one line of help)
+    "autopilot": ("sim.autopilot.cli", "a mock PX4 or ArduPilot on a real socket"),
+    "detector": ("sim.detector", "a simulated detector that follows the aircraft"),
+}
+
+
+def usage() -> str:
+    """The help text: every command with its line."""
+    rows = "\n".join(f"  {name:12} {line}" for name, (_, line) in COMMANDS.items())
+    return f"usage: roisearch-sim COMMAND [OPTIONS]\n\ncommands:\n{rows}\n\n'roisearch-sim COMMAND --help' tells more."
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; 2 if it is unknown."""
+    words = sys.argv[1:] if arguments is None else arguments
+    if not words or words[0] in ("-h", "--help"):
+        print(usage())
+        return 0 if words else 2
+    if words[0] not in COMMANDS:
+        print(f"roisearch-sim: no command '{words[0]}'; one of: {', '.join(COMMANDS)}", file=sys.stderr)
+        return 2
+    module = importlib.import_module(COMMANDS[words[0]][0])
+    code: int = module.main(words[1:])
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

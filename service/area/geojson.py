@@ -135,7 +135,7 @@ def position(value: object, where: Where) -> tuple[float, float]:
             f"{quote(value)} looks like projected coordinates in metres, not degrees; {_REPROJECT}"
         )
     if abs(lat) > 90:
-        swapped = "are longitude and latitude swapped? " if abs(lon) <= 90 and abs(lat) <= 180 else ""
+        swapped = "longitude and latitude look swapped, " if abs(lon) <= 90 and abs(lat) <= 180 else ""
         raise where.bad(f"latitude {lat:g} is out of range -90..90; {swapped}write [longitude, latitude]")
     if abs(lon) > 180:
         raise where.bad(
@@ -160,12 +160,12 @@ def polygon(rings: object, where: Where) -> shapely.Polygon:
         raise where.bad("the polygon is empty: it encloses no ground; draw it again")
     if not shapely.is_valid(shape):
         reason, _, place = shapely.is_valid_reason(shape).rstrip("]").partition("[")
-        at = ", ".join(place.split("]")[0].split())
+        at = quote([round(float(part), 7) for part in place.split("]")[0].split()])
         if "Self-intersection" in reason:
             raise where.bad(
-                f"the ring crosses or touches itself at [{at}]; move the corners so that it does not"
+                f"the ring crosses or touches itself at {at}; move the corners so that it does not"
             )
-        raise where.bad(f"the polygon is not valid ({reason.lower()}) at [{at}]; draw it again")
+        raise where.bad(f"the polygon is not valid ({reason.lower()}) at {at}; draw it again")
     return shape
 
 
@@ -177,7 +177,7 @@ def _ring(value: object, index: int, where: Where) -> NDArray[np.float64]:
         raise where.bad(f"the polygon is empty: {name} has no positions; draw it again")
     points = np.array([position(item, where) for item in value])
     if (points[0] != points[-1]).any():
-        first, last = quote(points[0].tolist()), quote(points[-1].tolist())
+        first, last = quote(points[0].round(7).tolist()), quote(points[-1].round(7).tolist())
         raise where.bad(
             f"{name} is not closed: it starts at {first} and ends at {last}; "
             "repeat the first position at the end"

@@ -15,6 +15,7 @@ from service.area.geojson import Where
 from service.area.model import LatLon, SearchArea
 from service.area.prior import area_prior, cell_squares, covered_fraction
 from service.area.projection import FloatArray, surface_m2
+from service.area.reading import check_launch
 from service.area.route import KeepOut
 from service.errors import BadInput
 
@@ -106,7 +107,8 @@ def build_grid(
         margin_m: how far outside the area a cell's centre may be flown over, in metres; None
             is half a cell's diagonal, just enough that every searchable cell is flyable.
         clearance_m: the distance to keep from exclusions, in metres.
-        launch: (latitude, longitude) to use instead of the launch point of the file.
+        launch: (latitude, longitude) to use instead of the launch point of the file, such as
+            the aircraft's home; it may be as far from the area as one in the file.
         max_cells: the largest grid, rows x cols.
 
     Raises:
@@ -115,6 +117,8 @@ def build_grid(
     """
     where = Where(area.source)
     _check_cell(area, cell_m, where)
+    if launch is not None:
+        check_launch(replace(area, launch=launch), where)
     half_diagonal = cell_m * math.sqrt(0.5) + 1e-6
     margin = half_diagonal if margin_m is None else margin_m
     if not (math.isfinite(margin) and margin >= 0):

@@ -84,7 +84,7 @@ def parse_area(
         launch=parts.launch,
         outside=parts.outside or 0.0,
     )
-    _check_launch(area, parts.launch_where, max_launch_m)
+    check_launch(area, parts.launch_where, max_launch_m)
     _check_priors(area)
     return area
 
@@ -254,7 +254,12 @@ def _check_extent(polygon: shapely.MultiPolygon, where: Where, max_area_km2: flo
         )
 
 
-def _check_launch(area: SearchArea, where: Where, max_launch_m: float) -> None:
+def check_launch(area: SearchArea, where: Where, max_launch_m: float = MAX_LAUNCH_M) -> None:
+    """Refuse a launch point that is further than `max_launch_m` metres from the search area.
+
+    Raises:
+        BadInput: it is; `where` names it in the message.
+    """
     if area.launch is None:
         return
     away = _distance_m(area.polygon, area.launch)

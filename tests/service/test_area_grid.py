@@ -188,6 +188,8 @@ def test_launch_can_be_given_instead_of_the_files() -> None:
     grid = grid_of(square(), launch(0, -200), launch=(lat, lon))
     assert grid.launch == (lat, lon)
     assert grid.start[1] == 15
+    with pytest.raises(BadInput, match=r"the launch point is \d+ km from the area, more than 2 km"):
+        grid_of(square(), launch=(48.0, 11.0))
 
 
 # --- sizes ---------------------------------------------------------------------------------------

@@ -219,7 +219,7 @@ REFUSED: dict[str, tuple[Any, tuple[str, ...]]] = {
     ),
     "swapped": (
         polygon([[p[1], p[0]] for p in box(-200, -200, 200, 200, (47.0, 151.0))]),
-        (SEARCH, "latitude 150.997 is out of range -90..90", "swapped?", "[longitude, latitude]"),
+        (SEARCH, "latitude 150.997 is out of range -90..90", "look swapped, write", "[longitude, latitude]"),
     ),
     "latitude out of range": (polygon([[150, 95], [150, 96], [151, 96], [150, 95]]), ("latitude 95 is out",)),
     "longitude out of range": (

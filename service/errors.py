@@ -1,5 +1,9 @@
-"""Errors meant for people."""
+"""Errors that a person can act on."""
 
 
-class BadInput(ValueError):
-    """What a person gave cannot be used; the message is one sentence: what, where, what would be right."""
+class BadInput(ValueError):  # noqa: N818 - named for what it tells the operator
+    """What the operator gave cannot be used.
+
+    The message is one sentence: what is wrong, where (file, feature, value), and what
+    would be right. The command line prints it as it is and exits with code 2.
+    """

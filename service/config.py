@@ -28,6 +28,9 @@ PlannerName = Literal[
 ]
 
 
+MOCK_SPEEDUP = 20.0
+
+
 class Section(BaseModel):
     """A table of the file: unknown keys are refused, values never change."""
 
@@ -39,6 +42,7 @@ class LinkSettings(Section):
     system_id: int = Field(default=0, ge=0, le=255)
     silent_after_s: float = Field(default=3.0, gt=0.5, le=60)
     connect_timeout_s: float = Field(default=120.0, gt=0)
+    speedup: float | None = Field(default=None, ge=1, le=100)
 
 
 class FlightSettings(Section):
@@ -85,7 +89,6 @@ class RunSettings(Section):
 
 class DemoSettings(Section):
     flavor: Literal["px4", "ardupilot"] = "px4"
-    speedup: float = Field(default=20.0, ge=1, le=100)
     endurance_min: float = Field(default=60.0, gt=0)
 
 
@@ -99,6 +102,16 @@ class Settings(Section):
     http: HttpSettings = HttpSettings()
     run: RunSettings = RunSettings()
     demo: DemoSettings = DemoSettings()
+
+    @property
+    def mock(self) -> bool:
+        """True when the built-in mock flies, because no link was given."""
+        return not self.link.connect
+
+    @property
+    def speedup(self) -> float:
+        """How much faster than real time the aircraft's clock runs; 1 on a link unless a simulator's is given."""
+        return self.link.speedup or (MOCK_SPEEDUP if self.mock else 1.0)
 
 
 def _flatten(model: type[BaseModel]) -> dict[str, Any]:
@@ -142,7 +155,9 @@ def read_settings(
         try:
             values = tomllib.loads(file.read_text(encoding="utf-8"))
         except OSError as error:
-            raise BadInput(f"{file}: cannot be read ({error.strerror}); give an existing TOML file") from error
+            raise BadInput(
+                f"{file}: cannot be read ({error.strerror}); give an existing TOML file"
+            ) from error
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise BadInput(f"{file}: is not TOML: {error}") from error
         _check(values, where)
@@ -159,7 +174,10 @@ def read_settings(
             section, key = dotted.split(".")
             values.setdefault(section, {})[key] = value
             _check(values, f"--{key.replace('_', '-')}")
-    return _check(values, where)
+    settings = _check(values, where)
+    if settings.link.speedup not in (None, 1.0) and settings.link.connect.startswith("serial"):
+        raise BadInput(f"{settings.link.connect} is a real aircraft: it flies at a speedup of 1")
+    return settings
 
 
 def _check(values: dict[str, Any], where: str) -> Settings:

@@ -12,7 +12,7 @@ import json
 import queue
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,7 +71,9 @@ class Journal:
                 "INSERT OR IGNORE INTO meta VALUES ('schema', ?)", (json.dumps(SCHEMA_VERSION),)
             )
         except sqlite3.Error as error:
-            raise BadInput(f"{path}: the journal cannot be opened ({error}); give a writable folder") from error
+            raise BadInput(
+                f"{path}: the journal cannot be opened ({error}); give a writable folder"
+            ) from error
         if (found := self.meta("schema")) != SCHEMA_VERSION:
             raise BadInput(f"{path}: journal of schema {found}, this version reads {SCHEMA_VERSION}")
         self._writer = threading.Thread(target=self._write, name="journal", daemon=True)
@@ -86,15 +88,15 @@ class Journal:
         """Store a JSON value under a key (used before the run starts)."""
         self._database.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, json.dumps(value)))
 
-    def write(self, time: float, kind: str, body: dict[str, Any], key: str | None = None) -> Future[int]:
+    def write(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> Future[int]:
         """Queue a row; the future holds its number once it is on disk, or raises Duplicate."""
         if self._closed:
             raise RuntimeError("the journal is closed")
-        entry = _Entry(time, kind, key, json.dumps(body), Future())
+        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
         self._queue.put(entry)
         return entry.done
 
-    async def append(self, time: float, kind: str, body: dict[str, Any], key: str | None = None) -> int:
+    async def append(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> int:
         """Write a row and return its number once it is on disk; raises Duplicate when `key` is known."""
         return await asyncio.wrap_future(self.write(time, kind, body, key))
 

@@ -26,7 +26,9 @@ def heading_between(here: Cell, there: Cell) -> str:
     """The direction of one move; raises ValueError when the cells are not neighbours."""
     step = (there[0] - here[0], there[1] - here[1])
     if step not in HEADING:
-        raise ValueError(f"cells {here} and {there} are not neighbours, a path enters one neighbour after another")
+        raise ValueError(
+            f"cells {here} and {there} are not neighbours, a path enters one neighbour after another"
+        )
     return HEADING[step]
 
 
@@ -94,7 +96,10 @@ class Navigator:
         """True when it is time to decide what comes after the waypoint."""
         if self._next:
             return False
-        return self._at_once or remaining_m <= self.lead_m(speed_mps) + speed_mps * thinking_s + 0.25 * self.cell_m
+        return (
+            self._at_once
+            or remaining_m <= self.lead_m(speed_mps) + speed_mps * thinking_s + 0.25 * self.cell_m
+        )
 
     def decide(self, path: Sequence[Cell]) -> None:
         """Take a decision's path, which starts at a neighbour of the waypoint."""

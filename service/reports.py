@@ -38,8 +38,12 @@ class Report(DoorModel):
 
     id: str = Field(min_length=1, max_length=128, description="unique; a repeated id is not counted twice")
     source: str = Field(default="detector", max_length=64)
-    captured_at: float = Field(description="seconds since the epoch, in the service's clock", allow_inf_nan=False)
-    usable: bool = Field(default=True, description="false: the frame shows nothing (blur, glare); no evidence")
+    captured_at: float = Field(
+        description="seconds since the epoch, in the service's clock", allow_inf_nan=False
+    )
+    usable: bool = Field(
+        default=True, description="false: the frame shows nothing (blur, glare); no evidence"
+    )
     pose: CameraPose | None = None
     detections: tuple[Detection, ...] = Field(default=(), max_length=256)
 

@@ -60,7 +60,9 @@ def test_a_path_that_jumps_is_refused() -> None:
         straight_part((0, 0), [(0, 1), (0, 3)])
 
 
-@given(st.lists(st.sampled_from(sorted(HEADING)), min_size=1, max_size=30), st.floats(0, 20), st.floats(0, 60))
+@given(
+    st.lists(st.sampled_from(sorted(HEADING)), min_size=1, max_size=30), st.floats(0, 20), st.floats(0, 60)
+)
 def test_what_is_sent_is_always_a_straight_beginning_of_the_path(
     steps: list[tuple[int, int]], speed: float, remaining: float
 ) -> None:

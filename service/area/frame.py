@@ -13,8 +13,8 @@ from service.area.projection import FloatArray, Projection
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-_SLACK_M = 1e-6
-"""An extent of exactly n cells is n cells, whatever the rounding of the projection."""
+_SLACK = 1e-3
+"""An extent of n cells and this part of one is n cells: drawn sizes are meant, millimetres are not."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,9 @@ class GridFrame:
     def _turn(self, plane: FloatArray) -> FloatArray:
         """Metres east and north of the projection's centre to metres east and south of our corner."""
         sin, cos = self._sin_cos()
-        east = plane[:, 0] * cos - plane[:, 1] * sin
-        north = plane[:, 0] * sin + plane[:, 1] * cos
+        with np.errstate(invalid="ignore"):  # what is no position stays not finite
+            east = plane[:, 0] * cos - plane[:, 1] * sin
+            north = plane[:, 0] * sin + plane[:, 1] * cos
         return np.stack([east - self.west_m, self.north_m - north], axis=1)
 
 
@@ -135,8 +136,8 @@ def _frame(
     unplaced = GridFrame(projection.lat, projection.lon, bearing_deg, cell_m, 0, 0, 0.0, 0.0)
     west, north, east, south = shapely.bounds(shapely.transform(hull, unplaced._turn))
     width, height = east - west + 2 * extra_m, south - north + 2 * extra_m
-    cols = max(1, math.ceil((width - _SLACK_M) / cell_m))
-    rows = max(1, math.ceil((height - _SLACK_M) / cell_m))
+    cols = max(1, math.ceil(width / cell_m - _SLACK))
+    rows = max(1, math.ceil(height / cell_m - _SLACK))
     west_m = float((west + east - cols * cell_m) / 2)
     north_m = float((rows * cell_m - north - south) / 2)
     return GridFrame(projection.lat, projection.lon, bearing_deg, cell_m, rows, cols, west_m, north_m)

@@ -1,6 +1,7 @@
 """A prior from a GeoTIFF of probabilities (extra `geotiff`)."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ _SAMPLES_PER_CELL = 8
 """A pixel is cut so that at least this many samples lie along the side of a cell."""
 
 _MAX_CUT = 64
+"""A pixel is cut into at most this many parts a side, so a pixel may be this many cells wide."""
+
 _CHUNK = 2_000_000
 """Samples located at once, to bound the memory."""
 
@@ -26,8 +29,8 @@ def read_geotiff_prior(
     """Read a raster of probabilities onto a grid, conserving mass.
 
     A pixel's value is the relative probability that the target is in that pixel. Each pixel
-    is cut into equal samples that go to the cells they lie in, so no mass is lost or made up
-    by interpolation, whatever the two resolutions and the raster's CRS. Nodata and NaN count
+    is cut into equal samples that are shared out to the cells they lie in, so no mass is lost
+    or made up by interpolation, whatever the two resolutions and the raster's CRS. Nodata and NaN count
     as zero. What lies off the grid, or on the uncovered part of a cell, is left out.
 
     Args:
@@ -72,18 +75,23 @@ def _read(raster: Any, frame: GridFrame, where: Where) -> FloatArray:
         raise where.bad("the raster has no coordinate reference system; set one, as with gdal_edit.py -a_srs")
     if raster.count != 1:
         raise where.bad(f"the raster has {raster.count} bands; give one band of probabilities")
-    to_raster = pyproj.Transformer.from_crs("EPSG:4326", raster.crs.to_wkt(), always_xy=True)
+    try:
+        to_raster = pyproj.Transformer.from_crs("EPSG:4326", raster.crs.to_wkt(), always_xy=True)
+    except pyproj.exceptions.ProjError:
+        raise where.bad(
+            "the raster's coordinate reference system is not on the earth; reproject it"
+        ) from None
     mass: FloatArray = np.zeros(frame.shape)
     spot = _window(raster, frame, to_raster)
     if spot is None:
         return mass
     top, left, height, width = spot
-    cut = _cut(raster, frame, to_raster)
-    rows_at_once = max(1, _CHUNK // (width * cut * cut))
+    samples = _samples(raster, frame, to_raster, where)
+    rows_at_once = max(1, _CHUNK // (width * samples.cut**2))
     for first in range(top, top + height, rows_at_once):
         count = min(rows_at_once, top + height - first)
         values = _values(raster, Window(left, first, width, count), where)
-        _scatter(mass, values, (first, left), cut, raster, frame, to_raster)
+        _scatter(mass, values, (first, left), samples, raster, frame, to_raster)
     return mass
 
 
@@ -129,34 +137,57 @@ def _clip(value: float, size: int) -> int:
     return int(min(max(math.floor(value), 0), size))
 
 
-def _cut(raster: Any, frame: GridFrame, to_raster: pyproj.Transformer) -> int:
-    """Into how many parts each side of a pixel is cut, from the pixel's size beside a cell's."""
+@dataclass(frozen=True)
+class _Samples:
+    """Into how many parts each side of a pixel is cut, and how large a part is, in cells (rows, cols)."""
+
+    cut: int
+    size: tuple[float, float]
+
+
+def _samples(raster: Any, frame: GridFrame, to_raster: pyproj.Transformer, where: Where) -> _Samples:
     middle = (np.array(frame.shape) - 1) / 2
     latlon = frame.to_latlon(middle + np.array([[0, 0], [1, 0], [0, 1]]))
     x, y = to_raster.transform(latlon[:, 1], latlon[:, 0])
     cols, rows = _apply(~raster.transform, x, y)
-    pixels_per_cell = min(math.hypot(cols[i] - cols[0], rows[i] - rows[0]) for i in (1, 2))
-    if not pixels_per_cell > 0:
-        return 1
-    return min(max(math.ceil(_SAMPLES_PER_CELL / pixels_per_cell), 1), _MAX_CUT)
+    down, across = (math.hypot(cols[i] - cols[0], rows[i] - rows[0]) for i in (1, 2))
+    if not min(down, across) * _MAX_CUT >= 1:
+        raise where.bad(
+            f"a pixel is wider than {_MAX_CUT} cells of {frame.cell_m:g} m; "
+            "resample the raster to smaller pixels, as with gdalwarp -tr"
+        )
+    cut = min(max(math.ceil(_SAMPLES_PER_CELL / min(down, across)), 1), _MAX_CUT)
+    return _Samples(cut, (1 / (down * cut), 1 / (across * cut)))
 
 
 def _scatter(
     mass: FloatArray,
     values: FloatArray,
     corner: tuple[int, int],
-    cut: int,
+    samples: _Samples,
     raster: Any,
     frame: GridFrame,
     to_raster: pyproj.Transformer,
 ) -> None:
     """Add the pixels' mass [h, w] to the cells [rows, cols] that their samples lie in."""
     row, col = np.nonzero(values)
+    cut = samples.cut
     offset = (np.arange(cut) + 0.5) / cut
     rows = corner[0] + row[:, None, None] + offset[:, None] + 0 * offset
     cols = corner[1] + col[:, None, None] + 0 * offset[:, None] + offset
     x, y = _apply(raster.transform, cols.ravel(), rows.ravel())
     lon, lat = to_raster.transform(x, y, direction="INVERSE")
-    cells, inside = frame.locate(np.stack([lat, lon], axis=1))
+    east, south = frame.to_metres(np.stack([lat, lon], axis=1)).T / frame.cell_m
     share = np.repeat(values[row, col], cut * cut) / (cut * cut)
-    np.add.at(mass, (cells[inside, 0], cells[inside, 1]), share[inside])
+    for in_row, row_part in _split(south, samples.size[0]):
+        for in_col, col_part in _split(east, samples.size[1]):
+            inside = (in_row >= 0) & (in_row < frame.rows) & (in_col >= 0) & (in_col < frame.cols)
+            cells = (in_row[inside].astype(np.int64), in_col[inside].astype(np.int64))
+            np.add.at(mass, cells, (share * row_part * col_part)[inside])
+
+
+def _split(middle: FloatArray, size: float) -> list[tuple[FloatArray, FloatArray]]:
+    """The two cells along one axis that samples of `size` cells touch, with the part of each in them."""
+    low, high = np.floor(middle - size / 2), np.floor(middle + size / 2)
+    beyond = np.where(high > low, (middle + size / 2 - high) / size, 0.0)
+    return [(low, 1.0 - beyond), (high, beyond)]

@@ -26,6 +26,9 @@ CLEARANCE_M = 5.0
 _SLIVER = 1e-6
 """Less than this part of a cell is rounding, not ground."""
 
+_NO_MASS = 1e-9
+"""A cell with less prior than this will not be searched before the battery ends."""
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -234,7 +237,7 @@ def _prior_notes(prior: FloatArray, searchable: BoolArray, flyable: BoolArray) -
             f"{unseen:.3g} % of the prior lies in cells that may not be flown over; "
             "only a footprint wider than one cell can look there.",
         )
-    empty = int((searchable & (prior == 0)).sum())
+    empty = int((searchable & (prior < _NO_MASS)).sum())
     if empty:
         notes += (f"{empty} of {int(searchable.sum())} searchable cells have no prior mass.",)
     return notes

@@ -50,7 +50,8 @@ class KeepOut:
         if not shapely.intersects_xy(self.zone, *point):
             return point
         edge = shapely.boundary(self.shell)
-        return shapely.get_coordinates(shapely.shortest_line(shapely.Point(point), edge))[1]
+        nearest = shapely.shortest_line(shapely.Point(point), edge)
+        return np.asarray(shapely.get_coordinates(nearest)[1])
 
 
 def keep_out(frame: GridFrame, exclusions: Sequence[Exclusion], clearance_m: float) -> KeepOut:

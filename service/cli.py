@@ -39,7 +39,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--flavor", choices=("px4", "ardupilot"), help="which autopilot the mock is (default: px4)"
     )
-    p.add_argument("--speedup", metavar="X", type=float, help="how much faster than real time the mock or simulator flies")
+    p.add_argument(
+        "--speedup",
+        metavar="X",
+        type=float,
+        help="how much faster than real time the mock or simulator flies",
+    )
     p.add_argument("--seed", metavar="S", type=int, help="seed of everything random (default: 1)")
     return p
 

@@ -80,10 +80,11 @@ class World:
 
 
 def draw(grid: Grid, seed: int) -> LatLon | None:
-    """A target drawn from the grid's prior."""
+    """A target drawn from the prior over the cells that the aircraft can get to; None: it is not in the area."""
     from sim.target import draw_target
 
-    where = draw_target(grid.prior * (1.0 - grid.outside), np.random.default_rng(seed))
+    reachable = np.where(grid.flyable, grid.prior, 0.0)
+    where = draw_target(reachable / reachable.sum() * (1.0 - grid.outside), np.random.default_rng(seed))
     if where is None:
         return None
     lat, lon = grid.frame.to_latlon(np.array([where]) - 0.5)[0]

@@ -36,6 +36,7 @@ from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
 log = logging.getLogger("roisearch")
 LatLon = tuple[float, float]
 TICK_S = 0.1
+SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 
 
 @dataclass
@@ -229,13 +230,14 @@ class Mission:
             lat, lon = self.found.lat, self.found.lon
             await self.happen(Event.CONFIRMED, f"found at {lat:.6f}, {lon:.6f}, p = {place.probability:.4f}")
             return
-        if place.probability >= 0.2:
+        if place.probability >= SUSPECT_AT:
             await self.happen(Event.SUSPECT, f"a place with probability {place.probability:.0%}")
-        elif place.probability < 0.1:
+        elif place.probability < CLEARED_BELOW:
             await self.happen(Event.CLEARED, "nothing there")
         battery = self.vehicle.telemetry.battery_percent
         flown = self.clock.now() - self.flight.began
-        if self.search.record.searched >= settings.search.stop_at_pos and self.state == State.SEARCHING:
+        enough = settings.search.stop_at_pos * self.search.grid.reachable_mass
+        if self.search.record.searched >= enough and self.state == State.SEARCHING:
             self.why_stopped = f"searched to POS {self.search.record.searched:.1%}"
             await self._stop_searching(Event.SEARCHED)
         elif self.flight.steps >= settings.search.max_steps:
@@ -367,8 +369,9 @@ class Mission:
         if self.state not in MAY_MOVE:
             log.warning("not sent in state %s: waypoint %.6f, %.6f", self.state, *point)
             return
-        if not leg_is_clear(self.search.grid, self._here(), point):
-            await self.hold("limits", f"the leg to {point[0]:.6f}, {point[1]:.6f} crosses an excluded area")
+        objection = self._objection(point)
+        if objection:
+            await self.hold("limits", f"the waypoint {point[0]:.6f}, {point[1]:.6f} {objection}")
             return
         body = {"command": "reposition", "lat": point[0], "lon": point[1], "alt_amsl_m": self._altitude_m}
         await self._write("command", body)
@@ -379,6 +382,15 @@ class Mission:
             self.flight.waypoints += 1
         except LinkError as error:
             log.warning("waypoint not sent: %s", error)
+
+    def _objection(self, point: LatLon) -> str:
+        """Why a waypoint must not be flown to from here, or nothing."""
+        if not leg_is_clear(self.search.grid, self._here(), point):
+            return "lies behind an excluded area"
+        limit = self.settings.flight.max_launch_distance_m
+        if self._distance(self.search.grid.launch, point) > limit:
+            return f"is more than {limit:g} m from the launch point"
+        return ""
 
     async def _command(self, action: Awaitable[object], name: str) -> None:
         """Carry out a command that is not a waypoint; a refusal is told, not fatal."""

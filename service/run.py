@@ -264,7 +264,9 @@ class Service:
     def state(self) -> dict[str, Any]:
         """Where the search stands."""
         mission, record = self.mission, self.search.record
-        telemetry = mission.vehicle.telemetry if mission and mission.vehicle.telemetry.position_known else None
+        telemetry = (
+            mission.vehicle.telemetry if mission and mission.vehicle.telemetry.position_known else None
+        )
         place = self.search.place
         lat, lon = self.search.grid.frame.to_latlon(np.array([place.centroid]))[0]
         pose = None

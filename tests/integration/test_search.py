@@ -72,7 +72,9 @@ def test_nothing_is_armed_on_a_given_link_without_takeoff(tmp_path: Path) -> Non
             service.wait_for("take off and select the guided mode")
             with pytest.raises(AssertionError):
                 service.wait_for("TAKEOFF|SEARCHING", patience_s=3.0)
-            assert httpx.post(f"{door}/api/commands", json={"command": "abort"}).json() == {"state": "ABORTED"}
+            assert httpx.post(f"{door}/api/commands", json={"command": "abort"}).json() == {
+                "state": "ABORTED"
+            }
             assert service.exit_code() == 4
     assert only_report(tmp_path / "runs")["outcome"] == "aborted"
 
@@ -87,11 +89,19 @@ def test_the_door_answers_bad_reports_in_words_and_counts_none_of_them_twice(tmp
         report = {"id": "mine", "captured_at": state["pose"]["time"]}
         assert door.post("/api/reports", json=report).json()[0]["status"] == "accepted"
         again = [{**report, "captured_at": state["pose"]["time"] - 1}, report]
-        assert [answer["status"] for answer in door.post("/api/reports", json=again).json()] == ["duplicate"] * 2
+        assert [answer["status"] for answer in door.post("/api/reports", json=again).json()] == [
+            "duplicate"
+        ] * 2
         old = door.post("/api/reports", json={"id": "old", "captured_at": 12.0}).json()[0]
         assert old["status"] == "refused"
         assert "no position" in old["reason"]
-        for wrong in ({"id": "x"}, {**report, "detections": [{"lat": 91, "lon": 0}]}, {**report, "colour": 1}, [], "x"):
+        for wrong in (
+            {"id": "x"},
+            {**report, "detections": [{"lat": 91, "lon": 0}]},
+            {**report, "colour": 1},
+            [],
+            "x",
+        ):
             answer = door.post("/api/reports", json=wrong)
             assert answer.status_code == (200 if wrong == [] else 422)
         assert door.post("/api/commands", json={"command": "explode"}).status_code == 422
@@ -108,7 +118,9 @@ def test_the_door_answers_bad_reports_in_words_and_counts_none_of_them_twice(tmp
 
 def test_the_command_that_the_readme_shows_first_runs_to_its_end(tmp_path: Path) -> None:
     readme = (REPOSITORY / "README.md").read_text(encoding="utf-8")
-    block = next(block for block in re.findall(r"```sh\n(.*?)```", readme, re.S) if "config/area.geojson" in block)
+    block = next(
+        block for block in re.findall(r"```sh\n(.*?)```", readme, re.S) if "config/area.geojson" in block
+    )
     words = shlex.split(block.strip().splitlines()[-1])
     service = words[words.index(".venv/bin/roisearch-service") :]
     more = ["--runs", str(tmp_path / "runs"), "--http", "127.0.0.1:0"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.kernels.compiled import allocating_kernel, kernel
+from roisearch.kernels.compiled import kernel
 from roisearch.kernels.goals import set_goals
 from roisearch.kernels.ground import cell_step
 from roisearch.kernels.puct import search
@@ -59,7 +59,7 @@ def choose(tree: Tree, by: int, held: int, margin: float, shown: Floats) -> int:
     return best
 
 
-@allocating_kernel
+@kernel
 def decide(
     cell: int,
     heading: int,

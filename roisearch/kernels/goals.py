@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from roisearch.kernels.compiled import allocating_kernel, kernel
+from roisearch.kernels.compiled import kernel
 from roisearch.kernels.forest import peak_cell
 from roisearch.kernels.ground import find_sources, flood, open_steps
 from roisearch.kernels.records import FAR, PEAK_GOAL, Aims, Floats, Forest, Ints, Land, Sight, Steps
@@ -78,7 +76,7 @@ def index_cell(
     return best_cell, best
 
 
-@allocating_kernel
+@kernel
 def set_goals(
     rule: int,
     row: int,
@@ -101,7 +99,8 @@ def set_goals(
     `field_goals` [regions] tells which goals the fields were made for: an unchanged goal keeps its field.
     """
     if forward.size > 0 and rule != PEAK_GOAL:
-        flood(np.full(1, row * land.cols + col), 0, land.legal, land.cols, forward, queue)
+        stack[0] = row * land.cols + col
+        flood(stack[:1], 0, land.legal, land.cols, forward, queue)
     for region in range(roots.size):
         goal = -1
         if roots[region] >= 0:

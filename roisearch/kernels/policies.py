@@ -72,5 +72,6 @@ def search_policies(
         restore(mass, logged)
         if total > best:
             best = total
-            path[:horizon] = trial[:horizon]
+            for step in range(horizon):
+                path[step] = trial[step]
     return best

@@ -76,7 +76,7 @@ def hope_of_option(
 def expand(
     node: int, row: int, col: int, tree: Tree, land: Land, mass: Mass, sight: Sight, aims: Aims, rules: Rules
 ) -> None:
-    """Make `node`: no children, no visits, and P(a) of each action from the one-step hopes; -1 marks an illegal one.
+    """Make `node`: no children, no visits, P(a) of each action from the one-step hopes, -1 if illegal.
 
     P(a) is `floor` plus the hope scaled to 0 .. 1 over the node's actions, then normalised; uniform when all
     hopes are equal.
@@ -149,7 +149,7 @@ def select(node: int, tree: Tree, rules: Rules) -> int:
 
 @kernel
 def jump(row: int, col: int, heading: int, region: int, land: Land, aims: Aims) -> tuple[int, int, int]:
-    """Where the lite model's option ends: at the goal, or beside one that cannot be entered; row, column, heading."""
+    """Where the lite model's option ends, at its goal or beside it: row, column, heading."""
     to_row, to_col = aims.goals[region, 1], aims.goals[region, 2]
     if land.legal[aims.goals[region, 0]] == 0:
         to_row, to_col = aims.sources[region, 0, 1], aims.sources[region, 0, 2]
@@ -185,7 +185,9 @@ def descend(
             row += row_step(action)
             col += col_step(action)
             heading = action
-            reward = rules.scale * gain_at(row, col, heading, land.rows, land.cols, mass, sight) - rules.penalty
+            reward = (
+                rules.scale * gain_at(row, col, heading, land.rows, land.cols, mass, sight) - rules.penalty
+            )
             kept = rules.discount
             if mass.fades:
                 logged = fade_at(row, col, heading, land.rows, land.cols, mass, sight, logged)

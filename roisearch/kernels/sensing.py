@@ -28,7 +28,9 @@ def gain_at(row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, 
 
 
 @kernel
-def fade_at(row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, sight: Sight, logged: int) -> int:
+def fade_at(
+    row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, sight: Sight, logged: int
+) -> int:
     """Let what is seen from here fade by 1 - p_tp, as the paper does in the tree.
 
     The cells go into the log, beginning at `logged`; returns how many are in it now. When the log is full

@@ -17,7 +17,7 @@ class Forest:
         regions: how many regions; one without cells is allowed.
     """
 
-    def __init__(self, labels: NDArray[np.int64], regions: int) -> None:
+    def __init__(self, labels: NDArray[np.integer], regions: int) -> None:
         self.shape: tuple[int, int] = (labels.shape[0], labels.shape[1])
         flat = labels.ravel()
         cells = np.flatnonzero(flat >= 0)

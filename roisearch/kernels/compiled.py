@@ -17,4 +17,9 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     No fast-math: sums keep the order that they are written in, so a kernel and its plain twin agree to the
     last bit, and so do two machines.
     """
+    return cast(Callable[P, R], numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function))
+
+
+def allocating_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """As `kernel`, for a function that makes arrays of its own."""
     return cast(Callable[P, R], numba.njit(cache=True, nogil=True, error_model="numpy")(function))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from sim.scenario import PAPER_SHAPE, PAPER_START, PAPER_STEPS, paper_prior
 
 FOVS = ("point", "donut", "wide-angle")
 PAPER_PLANNERS = ("puct-regions-lite", "puct-regions", "puct", "direct-policy-search", "greedy")
+PAPER_POINT_ONLY = ("puct", "direct-policy-search", "greedy")
 PAPER_TRIALS = 250
 SEARCH, CURVE, BOUND = "search", "curve", "bound"
 
@@ -50,6 +51,7 @@ class Campaign:
     Attributes:
         planners: names as `make_planner` knows them, each with `@preset` and `:option=value` if wanted.
         fovs: names of fields of view.
+        first_fov_only: those of the planners that fly with the first field of view only.
         trials: how many sampled searches a scenario (a planner with a field of view) has.
         curves: how many detection curves a scenario has; the first priors are used.
         seed: trial i draws everything from the i-th child of this seed, whatever the planner.
@@ -65,6 +67,7 @@ class Campaign:
 
     planners: tuple[str, ...]
     fovs: tuple[str, ...] = ("point",)
+    first_fov_only: tuple[str, ...] = ()
     trials: int = 100
     curves: int = 0
     seed: int = 1
@@ -115,18 +118,33 @@ class Campaign:
         """Whether the same settings give the same numbers: not with a deadline."""
         return self.deadline_s is None
 
+    def scenarios(self) -> list[tuple[str, str]]:
+        """The pairs of planner and field of view, in the order of a report."""
+        return [
+            (planner, fov)
+            for fov in self.fovs
+            for planner in self.planners
+            if fov == self.fovs[0] or planner not in self.first_fov_only
+        ]
+
     def jobs(self) -> list[Job]:
         """Every job, trial by trial, so that an interrupted campaign holds whole comparisons."""
+        scenarios = self.scenarios()
         jobs = []
         for trial in range(max(self.trials, self.curves)):
-            for fov in self.fovs:
-                jobs.append(Job(BOUND, "", fov, trial))
-                for planner in self.planners:
-                    if trial < self.curves:
-                        jobs.append(Job(CURVE, planner, fov, trial))
-                    if trial < self.trials:
-                        jobs.append(Job(SEARCH, planner, fov, trial))
+            jobs += [Job(BOUND, "", fov, trial) for fov in self.fovs]
+            for planner, fov in scenarios:
+                if trial < self.curves:
+                    jobs.append(Job(CURVE, planner, fov, trial))
+                if trial < self.trials:
+                    jobs.append(Job(SEARCH, planner, fov, trial))
         return jobs
+
+    def search_of(self, job: Job) -> Job | None:
+        """The search whose result comes with that of `job`, a curve: see `sim.trials.trial.run_job`."""
+        if job.kind == CURVE and self.found == "covered" and job.trial < self.trials:
+            return replace(job, kind=SEARCH)
+        return None
 
     def fov(self, name: str) -> FieldOfView:
         """The field of view of that name, with the campaign's detector."""

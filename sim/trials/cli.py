@@ -23,7 +23,15 @@ from rich.progress import (
 from rich.table import Table
 
 from roisearch import PLANNERS
-from sim.trials.campaign import FOVS, PAPER_PLANNERS, PAPER_TRIALS, Campaign, Job, load_prior
+from sim.trials.campaign import (
+    FOVS,
+    PAPER_PLANNERS,
+    PAPER_POINT_ONLY,
+    PAPER_TRIALS,
+    Campaign,
+    Job,
+    load_prior,
+)
 from sim.trials.journal import Journal, Refused
 from sim.trials.pool import executor, run
 from sim.trials.published import shown
@@ -62,8 +70,8 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--seed", type=int, default=1, metavar="S", help="same seed, same numbers (default 1)")
     p.add_argument("--preset", choices=("default", "paper", "reference"), default="default",
-                   help="of the tree searches; 'paper' also sets the paper's planners, FOVs, trials, and --found "
-                   "covered, unless they are given")  # fmt: skip
+                   help="of the tree searches; 'paper' also sets the paper's planners, FOVs (the baselines with the "
+                   "point FOV only, as in the paper), trials, and --found covered, unless they are given")  # fmt: skip
     p.add_argument("--found", choices=("hit", "covered"), help="what ends a search: the first true hit (default), or "
                    "the target in view")  # fmt: skip
     p.add_argument(
@@ -109,6 +117,7 @@ def campaign_from(options: argparse.Namespace) -> Campaign:
     if planners is None:
         raise ValueError("--planners is missing: name one or more, separated by commas")
     fovs = options.fov.split(",") if options.fov else FOVS if paper else ("point",)
+    first_fov_only = () if options.planners or options.fov or not paper else PAPER_POINT_ONLY
     trials = options.trials if options.trials is not None else PAPER_TRIALS if paper else 100
     ruler = options.ruler or ("both" if paper else "sampled")
     curves = options.curves if options.curves is not None else min(trials, _CURVES)
@@ -116,6 +125,7 @@ def campaign_from(options: argparse.Namespace) -> Campaign:
     return Campaign(
         planners=tuple(planners),
         fovs=tuple(fovs),
+        first_fov_only=first_fov_only,
         trials=0 if ruler == "curve" else trials,
         curves=0 if ruler == "sampled" else curves,
         seed=options.seed,
@@ -150,10 +160,10 @@ def _work(
     campaign: Campaign, journal: Journal, options: argparse.Namespace, console: Console, arguments: list[str]
 ) -> int:
     """Do what is not done yet, then write the report, also of a part."""
-    jobs = [job for job in campaign.jobs() if job not in journal.results]
+    jobs = journal.left(campaign.jobs(), campaign)
     code, began = 0, time.monotonic()
     if journal.results and jobs:
-        console.print(f"{len(journal.results)} of {len(journal.results) + len(jobs)} jobs are there already")
+        console.print(f"{len(journal.results)} results are there already")
     try:
         if jobs:
             _run_all(campaign, journal, jobs, options, console)
@@ -194,8 +204,8 @@ def _run_all(
                 if count:
                     bars[name] = progress.add_task(f"  {shown(name) if name else _BOUNDS}", total=count)
 
-            def done(job: Job, result: dict[str, Any]) -> None:
-                journal.add(job, result)
+            def done(job: Job, results: list[dict[str, Any]]) -> None:
+                journal.add(results)
                 progress.advance(everything)
                 progress.advance(bars[job.planner])
 
@@ -204,9 +214,9 @@ def _run_all(
 
 def _compile(campaign: Campaign, progress: Progress) -> None:
     """Compile every kernel once, before the workers do it at the same time."""
-    specs = [(planner, fov) for planner in campaign.planners for fov in campaign.fovs]
-    bar = progress.add_task("compiling", total=len(specs))
-    for planner, fov in specs:
+    scenarios = campaign.scenarios()
+    bar = progress.add_task("compiling", total=len(scenarios))
+    for planner, fov in scenarios:
         campaign.planner(planner, fov, None).warm_up()
         progress.advance(bar)
     progress.remove_task(bar)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -27,6 +28,11 @@ def write_whole(path: Path, text: str) -> None:
     scratch = path.with_name(path.name + ".part")
     scratch.write_text(text, encoding="utf-8")
     scratch.replace(path)
+
+
+def job_of(result: dict[str, Any]) -> Job:
+    """The job that a result is of."""
+    return Job(result["kind"], result["planner"], result["fov"], result["trial"])
 
 
 class Journal:
@@ -67,18 +73,23 @@ class Journal:
         for number, line in enumerate(data[:whole].splitlines(), 1):
             try:
                 result = json.loads(line)
-                job = Job(result["kind"], result["planner"], result["fov"], result["trial"])
+                self.results[job_of(result)] = result
             except (ValueError, KeyError, TypeError):
                 raise Refused(
                     f"line {number} of {self._path} is damaged; delete it to redo its job"
                 ) from None
-            self.results[job] = result
 
-    def add(self, job: Job, result: dict[str, Any]) -> None:
-        """Write down one result."""
-        line = json.dumps(result, separators=(",", ":")) + "\n"
-        os.write(self._file, line.encode())
-        self.results[job] = result
+    def left(self, jobs: Sequence[Job], campaign: Campaign) -> list[Job]:
+        """The jobs that are to be done, without those whose results come with another's."""
+        pending = [job for job in jobs if job not in self.results]
+        given = {campaign.search_of(job) for job in pending}
+        return [job for job in pending if job not in given]
+
+    def add(self, results: Sequence[dict[str, Any]]) -> None:
+        """Write down the results of one job."""
+        lines = [json.dumps(result, separators=(",", ":")) + "\n" for result in results]
+        os.write(self._file, "".join(lines).encode())
+        self.results.update((job_of(result), result) for result in results)
 
     def __enter__(self) -> Journal:
         return self

@@ -60,7 +60,7 @@ def run(
     workers: int,
     campaign: Campaign,
     jobs: Sequence[Job],
-    done: Callable[[Job, dict[str, Any]], None],
+    done: Callable[[Job, list[dict[str, Any]]], None],
 ) -> None:
     """Run the jobs in any order; `done` is called here, in this thread, for each as it ends.
 
@@ -68,7 +68,7 @@ def run(
         Whatever a job raises; what was handed in and not begun is then cancelled.
     """
     left = iter(jobs)
-    waiting: dict[Future[dict[str, Any]], Job] = {}
+    waiting: dict[Future[list[dict[str, Any]]], Job] = {}
 
     def hand_in(count: int) -> None:
         for _, job in zip(range(count), left, strict=False):

@@ -26,15 +26,14 @@ def summarise(campaign: Campaign, results: Results) -> dict[str, Any]:
     """
     bounds = {(job.fov, job.trial): result for job, result in results.items() if job.kind == BOUND}
     scenarios = []
-    for fov in campaign.fovs:
-        for planner in campaign.planners:
-            mine = {job: r for job, r in results.items() if job.planner == planner and job.fov == fov}
-            row: dict[str, Any] = {"planner": planner, "fov": fov}
-            row["sampled"] = _sampled(_of(mine, SEARCH), bounds)
-            row["curve"] = _curves(_of(mine, CURVE), bounds)
-            row["time_per_step_ms"] = _times(_of(mine, SEARCH) or _of(mine, CURVE))
-            if row["sampled"] or row["curve"]:
-                scenarios.append(row)
+    for planner, fov in campaign.scenarios():
+        mine = {job: r for job, r in results.items() if job.planner == planner and job.fov == fov}
+        row: dict[str, Any] = {"planner": planner, "fov": fov}
+        row["sampled"] = _sampled(_of(mine, SEARCH), bounds)
+        row["curve"] = _curves(_of(mine, CURVE), bounds)
+        row["time_per_step_ms"] = _times(_of(mine, SEARCH) or _of(mine, CURVE))
+        if row["sampled"] or row["curve"]:
+            scenarios.append(row)
     return {
         "campaign": campaign.to_dict(),
         "scenarios": scenarios,

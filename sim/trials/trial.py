@@ -10,6 +10,7 @@ without false alarms, and with them up to what false alarms at the target's own 
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from roisearch import Belief, SearchState, bounds, segment_regions
 from roisearch.fov import HEADINGS, MOVES, FieldOfView
-from sim.trials.campaign import BOUND, CURVE, Campaign, Job, Scenario
+from sim.trials.campaign import BOUND, CURVE, SEARCH, Campaign, Job, Scenario
 from sim.trials.world import look
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -29,30 +30,64 @@ _HEADING_OF = {move: number for number, move in enumerate(MOVES)}
 _warm: set[tuple[str, str]] = set()
 
 
-def run_job(campaign: Campaign, job: Job) -> dict[str, Any]:
-    """Do one job; the result is made of plain values, the times it took under "timing".
+def run_job(campaign: Campaign, job: Job) -> list[dict[str, Any]]:
+    """Do one job; the results are made of plain values, the times they took under "timing".
+
+    When being in view is being found, the path of a search is the beginning of the path of an undetected target:
+    then a curve gives the search of the same trial as well, and there are two results.
 
     Raises:
         RuntimeError: when a planner makes a move that is none.
     """
     began = time.perf_counter()
     scenario = campaign.scenario(job.trial)
-    head = {"kind": job.kind, "planner": job.planner, "fov": job.fov, "trial": job.trial}
     if job.kind == BOUND:
-        result = _bound(campaign, job, scenario)
-        return {**head, **result, "timing": {"seconds": time.perf_counter() - began}}
+        result = {**_head(job), **_bound(campaign, job, scenario)}
+        return [{**result, "timing": {"seconds": time.perf_counter() - began}}]
     key = (job.planner.partition(":")[0], job.fov)
     if key not in _warm:
         campaign.planner(job.planner, job.fov, None).warm_up()
         _warm.add(key)
-    run = _Run(campaign, job, scenario)
-    result = run.curve() if job.kind == CURVE else run.search()
-    timing = {
-        "seconds": time.perf_counter() - began,
-        "plan_ms": 1e3 * run.planning / max(run.steps, 1),
-        "slowest_ms": 1e3 * run.slowest,
+        began = time.perf_counter()
+    follow = job.kind == CURVE
+    also = campaign.search_of(job)
+    target = _draw_target(campaign, job, scenario) if also or not follow else -1
+    run = _Run(campaign, job, scenario, target, follow)
+    run.fly()
+    results = []
+    if follow:
+        left = 1.0 - float(run.detected[-1])
+        curve = {**describe(run.detected), "left": left, "steps": run.tally.steps}
+        results.append({**_head(job), **curve, "timing": run.tally.timing(began)})
+        job = also or job
+    if job.kind == SEARCH:
+        results.append({**_head(job), **_search(scenario, run, target), "timing": run.search.timing(began)})
+    return results
+
+
+def _head(job: Job) -> dict[str, Any]:
+    return {"kind": job.kind, "planner": job.planner, "fov": job.fov, "trial": job.trial}
+
+
+def _draw_target(campaign: Campaign, job: Job, scenario: Scenario) -> int:
+    """A cell drawn from the prior, flat index."""
+    edges = np.cumsum(scenario.prior.ravel())
+    draw = campaign.rng(job.trial, 1).random() * edges[-1]
+    return min(int(np.searchsorted(edges, draw, side="right")), edges.size - 1)
+
+
+def _search(scenario: Scenario, run: _Run, target: int) -> dict[str, Any]:
+    prior = scenario.prior
+    regions = segment_regions(prior)
+    return {
+        "found": run.found,
+        "steps": run.search.steps,
+        "seen": run.search.cells / prior.size,
+        "false_alarms": run.search.false_alarms,
+        "target": [target // prior.shape[1], target % prior.shape[1]],
+        "in_region": bool(regions.labels.ravel()[target] > 0),
+        "regions": int(regions.count),
     }
-    return {**head, **result, "timing": timing}
 
 
 def grid(cap: int) -> NDArray[np.int64]:
@@ -60,47 +95,44 @@ def grid(cap: int) -> NDArray[np.int64]:
     return np.unique(np.concatenate([[0], np.round(np.geomspace(1, cap, GRID_POINTS))])).astype(np.int64)
 
 
-class _Run:
-    """A planner on its way over one map."""
+@dataclass
+class _Tally:
+    """What a run has counted up to some step; `planning` and `slowest` in seconds of the processor."""
 
-    def __init__(self, campaign: Campaign, job: Job, scenario: Scenario) -> None:
-        self.campaign, self.job, self.scenario = campaign, job, scenario
-        self.steps, self.false_alarms = 0, 0
-        self.planning, self.slowest = 0.0, 0.0
-        self.cells = 0
+    steps: int = 0
+    cells: int = 0
+    false_alarms: int = 0
+    planning: float = 0.0
+    slowest: float = 0.0
 
-    def search(self) -> dict[str, Any]:
-        """Look for a drawn target until it is found or the cap is reached."""
-        prior = self.scenario.prior
-        edges = np.cumsum(prior.ravel())
-        draw = self.campaign.rng(self.job.trial, 1).random() * edges[-1]
-        target = min(int(np.searchsorted(edges, draw, side="right")), prior.size - 1)
-        regions = segment_regions(prior)
-        found, _ = self._fly(target, np.zeros(0))
+    def timing(self, began: float) -> dict[str, float]:
+        """The times as they are written down."""
         return {
-            "found": found,
-            "steps": self.steps,
-            "seen": self.cells / prior.size,
-            "false_alarms": self.false_alarms,
-            "target": [target // prior.shape[1], target % prior.shape[1]],
-            "in_region": bool(regions.labels.ravel()[target] > 0),
-            "regions": int(regions.count),
+            "seconds": time.perf_counter() - began,
+            "plan_ms": 1e3 * self.planning / max(self.steps, 1),
+            "slowest_ms": 1e3 * self.slowest,
         }
 
-    def curve(self) -> dict[str, Any]:
-        """Follow the path of an undetected target; what is undetected at the end counts as never detected."""
-        detected = np.zeros(self.campaign.cap + 1)
-        _, left = self._fly(-1, detected)
-        detected[self.steps :] = detected[self.steps]
-        return {**describe(detected), "left": left, "steps": self.steps}
 
-    def _fly(self, target: int, detected: NDArray[np.float64]) -> tuple[bool, float]:
-        """Fly until the target is found, the curve is followed to its tail, or the cap is reached.
+class _Run:
+    """A planner on its way over one map.
 
-        detected: float [cap + 1], filled with F, or empty. Returns whether the target was found, and the
-        probability left undetected.
-        """
-        campaign, job = self.campaign, self.job
+    Args:
+        target: flat index of the target's cell, or -1.
+        follow: follow the curve of an undetected target; else end when the target is found.
+    """
+
+    def __init__(self, campaign: Campaign, job: Job, scenario: Scenario, target: int, follow: bool) -> None:
+        self.campaign, self.job, self.scenario = campaign, job, scenario
+        self.target, self.follow = target, follow
+        self.tally = _Tally()  # of the curve when there is one
+        self.search = _Tally()  # when the target was found, or at the cap
+        self.found = False
+        self.detected = np.zeros(campaign.cap + 1 if follow else 0)
+
+    def fly(self) -> None:
+        """Fly until the target is found and the curve followed to its tail, or to the cap."""
+        campaign, job, now = self.campaign, self.job, _Tally()
         prior = self.scenario.prior
         cols = prior.shape[1]
         fov = campaign.fov(job.fov)
@@ -115,38 +147,50 @@ class _Run:
         draws, first = noise.random(_DRAWS * k), 0
         state = SearchState(campaign.start, HEADINGS[0])
         covered, deadline = campaign.found == "covered", campaign.deadline_s
-        follow = detected.size > 0
-        left = 1.0
-        clock = time.perf_counter
-        while self.steps < campaign.cap:
+        following, left = self.follow, 1.0
+        clock = time.thread_time  # planning is one thread; wall time would count the other workers
+        while now.steps < campaign.cap:
             began = clock()
             decision = planner.plan(belief, state, rng, deadline_s=deadline)
             spent = clock() - began
-            self.planning += spent
-            if spent > self.slowest:
-                self.slowest = spent
+            now.planning += spent
+            now.slowest = max(now.slowest, spent)
             cell = decision.path[0]
             heading = self._heading(state.cell, cell)
             state = SearchState(cell, HEADINGS[heading])
             if first == draws.size:
                 draws, first = noise.random(_DRAWS * k), 0
             count, found, gained, fresh, false = look(
-                cell[0], cell[1], heading, target, covered, fov.offsets, fov.p_tp, fov.p_tn, draws, first,
-                undetected, seen, cols, cells, hits, tp, tn,
+                cell[0], cell[1], heading, self.target, covered, self.follow, fov.offsets, fov.p_tp, fov.p_tn, draws,
+                first, undetected, seen, cols, cells, hits, tp, tn,
             )  # fmt: skip
             first += k
-            self.steps += 1
-            self.cells += fresh
-            self.false_alarms += false
+            now.steps += 1
+            now.cells += fresh
+            now.false_alarms += false
             left -= gained
-            if follow:
-                detected[self.steps] = 1.0 - left
-                if left < campaign.tail:
+            if found and not self.found:
+                self.found = True
+                self.search = replace(now)
+                if not following:
                     break
-            elif found:
-                return True, left
+            if following:
+                self.detected[now.steps] = 1.0 - left
+                if left < campaign.tail:
+                    following = False
+                    self._end_curve(now)
+                    if self.found or self.target < 0:
+                        break
             belief.observe(cells[:count], hits[:count], tp[:count], tn[:count])
-        return False, left
+        if following:
+            self._end_curve(now)
+        if not self.found:
+            self.search = replace(now)
+
+    def _end_curve(self, now: _Tally) -> None:
+        """What is undetected now counts as never detected."""
+        self.tally = replace(now)
+        self.detected[now.steps :] = self.detected[now.steps]
 
     def _heading(self, here: tuple[int, int], there: tuple[int, int]) -> int:
         """The number of the move from `here` to `there`."""

@@ -15,6 +15,7 @@ def look(
     heading: int,
     target: int,
     covered: bool,
+    silent: bool,
     offsets: NDArray[np.int64],
     p_tp: NDArray[np.float64],
     p_tn: NDArray[np.float64],
@@ -31,8 +32,9 @@ def look(
     """One look from (row, col).
 
     Args:
-        target: flat index of the target's cell, -1 when the target stays undetected whatever is looked at.
+        target: flat index of the target's cell, -1 when there is none.
         covered: whether having the target in view is finding it.
+        silent: whether the detector says of the target's cell what it would say of any other one.
         offsets, p_tp, p_tn: the field of view, [4, k, 2], [k], [k].
         draws: uniform numbers; those from `first` on are used, one for each cell of the field of view.
         undetected: [cells], the mass of each cell that all looks so far would have missed; updated.
@@ -59,11 +61,12 @@ def look(
             seen[cell] = True
             fresh += 1
         if cell == target:
+            found = found or draws[first + i] < detects
+        if cell == target and not silent:
             hit = draws[first + i] < detects
-            found = found or hit
         else:
             hit = draws[first + i] >= p_tn[i]
-            false_alarms += hit
+            false_alarms += hit and cell != target
         cells[count, 0], cells[count, 1] = r, c
         hits[count] = hit
         tp[count] = p_tp[i]

@@ -37,7 +37,7 @@ from sim.trials.pool import executor, run
 from sim.trials.published import shown
 from sim.trials.report import percent, write_report
 
-_CURVES = 40
+_CURVES, _PAPER_CURVES = 40, 20
 _BOUNDS = "bounds"
 
 
@@ -61,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
         "--curves",
         type=int,
         metavar="N",
-        help=f"detection curves of each (default as many trials, at most {_CURVES})",
+        help=f"detection curves of each (default: as many, at most {_CURVES}, with --preset paper {_PAPER_CURVES})",
     )
     p.add_argument(
         "--ruler",
@@ -120,7 +120,9 @@ def campaign_from(options: argparse.Namespace) -> Campaign:
     first_fov_only = () if options.planners or options.fov or not paper else PAPER_POINT_ONLY
     trials = options.trials if options.trials is not None else PAPER_TRIALS if paper else 100
     ruler = options.ruler or ("both" if paper else "sampled")
-    curves = options.curves if options.curves is not None else min(trials, _CURVES)
+    curves = (
+        options.curves if options.curves is not None else min(trials, _PAPER_CURVES if paper else _CURVES)
+    )
     given: dict[str, Any] = load_prior(options.prior) if options.prior else {"shape": options.size}
     return Campaign(
         planners=tuple(planners),

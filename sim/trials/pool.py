@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -10,6 +11,9 @@ from typing import Any
 
 from sim.trials.campaign import Campaign, Job
 from sim.trials.trial import run_job
+
+CONNECT_TIMEOUT_S = 15.0
+"""How long a Dask scheduler may take to answer."""
 
 _AHEAD = 64
 """Jobs handed in and not done yet, per worker: enough to keep every worker busy, few enough to stop at once."""
@@ -26,11 +30,18 @@ def executor(jobs: int, scheduler: str = "") -> Iterator[tuple[Executor, int]]:
         with _cluster(scheduler) as answer:
             yield answer
         return
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    pool = ProcessPoolExecutor(
+        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_the_terminal
+    )
     try:
         yield pool, jobs
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _end_with_the_terminal() -> None:
+    """Let Ctrl-C end a worker at once and without a word; what it was doing is done again."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @contextmanager
@@ -41,7 +52,7 @@ def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
         raise ValueError("--scheduler needs Dask: pip install 'roisearch[cluster]'") from None
     library: Any = distributed
     try:
-        client = library.Client(scheduler, timeout=15)
+        client = library.Client(scheduler, timeout=CONNECT_TIMEOUT_S)
     except OSError:
         raise ValueError(f"no Dask scheduler answers at {scheduler}") from None
     with client:

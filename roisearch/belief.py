@@ -30,9 +30,10 @@ _TINY, _HUGE = 2.0**-500, 2.0**500
 class Belief:
     """The probability of each cell, and of 'not in the area at all'.
 
-    A look multiplies the odds of the looked-at cell by p_tp / (1 - p_tn) on a hit and by (1 - p_tp) / p_tn on a
-    miss (Bayes' rule for one static target, the paper's section 'Belief Update'), and of nothing else. So
-    the weights are kept unnormalised beside their total, and an observation of k cells costs O(k log cells).
+    A look multiplies the odds of the looked-at cell by p_tp / (1 - p_tn) on a hit and by (1 - p_tp) / p_tn
+    on a miss (Bayes' rule for one static target, the paper's section 'Belief Update'), and of nothing else.
+    So the weights are kept unnormalised beside their total, and an observation of k cells costs O(k log
+    cells).
 
     Args:
         prior: float [rows, cols], finite, not negative; scaled so that the cells hold 1 - outside together.
@@ -283,5 +284,7 @@ def _numbers(value: ArrayLike, k: int, name: str) -> NDArray[np.float64]:
         return _KNOWN[value]
     array = np.ascontiguousarray(value, dtype=np.float64)
     if array.shape not in ((k,), (1,)):
-        raise ValueError(f"{name} must be one number or one for each of the {k} cells, not of shape {array.shape}")
+        raise ValueError(
+            f"{name} must be one number or one for each of the {k} cells, not of shape {array.shape}"
+        )
     return array

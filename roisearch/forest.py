@@ -10,7 +10,7 @@ from roisearch.kernels.looks import FANOUT
 
 
 class Forest:
-    """For each region 0 .. regions - 1 a tree over its cells. Immutable; what the arrays mean: `kernels.forest`.
+    """For each region 0 .. regions - 1 a tree over its cells, immutable; its arrays: see `kernels.forest`.
 
     Args:
         labels: int [rows, cols], the region of each cell, negative for none.

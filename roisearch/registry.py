@@ -45,9 +45,9 @@ def make_planner(name: str, *, fov: FieldOfView, **options: Any) -> Planner:
 
     Args:
         fov: the field of view of the sensor.
-        options: for every planner `flyable` (bool [rows, cols]) and `regions` (segmented from the first belief
-            unless given); for the PUCT planners `preset` ("default" or "paper") and any of `PuctSettings`; for
-            the others see their classes.
+        options: for every planner `flyable` (bool [rows, cols]) and `regions` (segmented from the first
+            belief unless given); for the PUCT planners `preset` ("default" or "paper") and any of
+            `PuctSettings`; for the others see their classes.
 
     Raises:
         ValueError: when there is no such planner or option, or a value is out of range.

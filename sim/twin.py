@@ -1,9 +1,9 @@
 """The planner's twin in plain Python: the same search without NumPy, numba or any cleverness.
 
 It exists to be believed: `roisearch` must decide exactly as this does, with the same random numbers, and the
-benchmark's ratios are against this, in the same run. So it is written for reading: tuples, lists and dictionaries,
-the paper's steps one below the other. Where the order of a floating-point sum could show, it is the
-planner's order (sums of sixteen).
+benchmark's ratios are against this, in the same run. So it is written for reading: tuples, lists and
+dictionaries, the paper's steps one below the other. Where the order of a floating-point sum could show, it
+is the planner's order (sums of sixteen).
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class TwinBelief:
 
 @dataclass
 class Region:
-    """A region of interest: its cells in the order in which they are summed, and what follows from the belief."""
+    """A region of interest: its cells in the order of their sum, and what follows from the belief."""
 
     cells: list[Cell]
     centroid: tuple[float, float]

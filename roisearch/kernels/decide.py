@@ -34,7 +34,7 @@ from roisearch.kernels.trips import walk_trip
 
 @kernel
 def choose(tree: Tree, by: int, held: int, margin: float, shown: Floats) -> int:
-    """The root's best action by visits or by value; `shown` [actions, 2] becomes visits (-1: illegal) and value.
+    """The root's best action by visits or by value, which `shown` [actions, 2] tells (-1 visits: illegal).
 
     Action `held` (-1: none), a trip begun earlier, is kept unless another's value is better by more than
     `margin` times as much.
@@ -66,6 +66,7 @@ def decide(
     nodes: int,
     iterations: int,
     held: int,
+    scale: float,
     state: NDArray[np.uint64],
     weights: Floats,
     sums: Floats,
@@ -112,7 +113,6 @@ def decide(
     density: float,
     alpha: float,
     floor: float,
-    scale: float,
     child: Steps,
     stats: Floats,
     visits: Floats,
@@ -122,7 +122,7 @@ def decide(
     shown: Floats,
     path: Ints,
 ) -> tuple[int, int, int]:
-    """Search from `cell`, or search on when `nodes` > 0: nodes in the tree, the chosen action, cells in `path`.
+    """Search from `cell`, or on when `nodes` > 0: nodes in the tree, chosen action, cells in `path`.
 
     What the arrays are: `kernels.records`. `roots` and `sizes` [regions] are each region's tree and number of
     cells; `held` is an action to keep unless another is clearly better, -1 for none.
@@ -140,8 +140,8 @@ def decide(
     if nodes == 0:
         forest = Forest(cell_of, first, last, box, peaks)
         set_goals(
-            goal_rule, row, col, roots, weights, forest, land, sight, reach, worth, forward, queue, field_goals,
-            stack, aims,
+            goal_rule, row, col, roots, weights, forest, land, sight, reach, worth, forward, queue,
+            field_goals, stack, aims,
         )  # fmt: skip
         for region in range(roots.size):
             means[region] = sums[roots[region]] / sizes[region] if roots[region] >= 0 else 0.0

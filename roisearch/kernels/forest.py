@@ -5,10 +5,11 @@ box on the map: the same tree answers 'how much mass is in region 3', 'where is 
 by branch and bound, 'which cell has the most mass for its distance'. Like the belief's total, every number is
 recomputed from the weights and never adjusted, so it cannot drift.
 
-Arrays (see `roisearch.forest.Forest`): `cell_of` [slots] the cell in a slot, -1 for padding; `slot_of` [cells]
-its inverse, -1 for a cell in no region; nodes 0 .. slots / 16 - 1 are the leaves, node j over slots 16 j ..
-16 j + 15; `first`, `last` [nodes] the children of an inner node; `parent` [nodes], -1 for a root; `box`
-[nodes, 4] the rows and columns covered, inclusive: row_min, row_max, col_min, col_max; `root` [regions].
+Arrays (see `roisearch.forest.Forest`): `cell_of` [slots] the cell in a slot, -1 for padding; `slot_of`
+[cells] its inverse, -1 for a cell in no region; nodes 0 .. slots / 16 - 1 are the leaves, node j over slots
+16 j .. 16 j + 15; `first`, `last` [nodes] the children of an inner node; `parent` [nodes], -1 for a root;
+`box` [nodes, 4] the rows and columns covered, inclusive: row_min, row_max, col_min, col_max; `root`
+[regions].
 """
 
 from __future__ import annotations

@@ -9,9 +9,7 @@ from roisearch.kernels.records import FAR, PEAK_GOAL, Aims, Floats, Forest, Ints
 
 
 @kernel
-def steps_from(
-    row: int, col: int, goal: int, land: Land, sight: Sight, forward: Steps, sources: Ints
-) -> int:
+def steps_from(row: int, col: int, goal: int, land: Land, sight: Sight, forward: Steps, sources: Ints) -> int:
     """Steps from (row, col) until `goal` has been looked at; `forward` [cells] as in `index_cell`."""
     count = 0
     if forward.size > 0 or not sight.is_point:
@@ -54,7 +52,9 @@ def index_cell(
     while top >= 0:
         node = stack[top]
         top -= 1
-        apart = max(box[node, 0] - row, 0, row - box[node, 1]) + max(box[node, 2] - col, 0, col - box[node, 3])
+        apart = max(box[node, 0] - row, 0, row - box[node, 1]) + max(
+            box[node, 2] - col, 0, col - box[node, 3]
+        )
         if forest.peaks[node] * worth[min(max(apart - reach, 1), far)] <= best:
             continue
         if node * 16 >= forest.cell_of.size:
@@ -94,7 +94,7 @@ def set_goals(
     stack: Ints,
     aims: Aims,
 ) -> None:
-    """Fill `aims`: the goal of each region (-1: nothing there to find), its sources, the way around obstacles.
+    """Fill `aims`: each region's goal (-1: nothing to find), its sources, the way around obstacles.
 
     `field_goals` [regions] tells which goals the fields were made for: an unchanged goal keeps its field.
     """
@@ -119,6 +119,11 @@ def set_goals(
         aims.counts[region] = find_sources(goal, land, sight, aims.sources[region])
         if aims.fields.shape[0] > 0 and goal != field_goals[region]:
             flood(
-                aims.sources[region, : aims.counts[region], 0], 1, land.legal, land.cols, aims.fields[region], queue
+                aims.sources[region, : aims.counts[region], 0],
+                1,
+                land.legal,
+                land.cols,
+                aims.fields[region],
+                queue,
             )
             field_goals[region] = goal

@@ -10,17 +10,17 @@ obstacles it is a breadth-first search from the sources, kept in `Aims.fields`.
 
 from __future__ import annotations
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.records import FAR, Aims, Bits, Ints, Land, Sight, Steps
 
 
-@kernel
+@inlined
 def row_step(move: int) -> int:
     """Rows down by a move."""
     return move - 1 if move & 1 == 0 else 0
 
 
-@kernel
+@inlined
 def col_step(move: int) -> int:
     """Columns to the right by a move."""
     return 2 - move if move & 1 == 1 else 0
@@ -86,7 +86,9 @@ def flood(sources: Ints, start: int, legal: Bits, cols: int, field: Steps, queue
 
 
 @kernel
-def open_steps(row: int, col: int, goal_row: int, goal_col: int, sources: Ints, count: int, sight: Sight) -> int:
+def open_steps(
+    row: int, col: int, goal_row: int, goal_col: int, sources: Ints, count: int, sight: Sight
+) -> int:
     """Steps on open ground until the goal has been looked at; FAR when no pose sees it."""
     if sight.is_point:
         apart = abs(goal_row - row) + abs(goal_col - col)
@@ -103,5 +105,11 @@ def steps_to(row: int, col: int, region: int, cols: int, aims: Aims, sight: Sigh
     if aims.fields.shape[0] > 0:
         return int(aims.fields[region, row * cols + col])
     return open_steps(
-        row, col, aims.goals[region, 1], aims.goals[region, 2], aims.sources[region], aims.counts[region], sight
+        row,
+        col,
+        aims.goals[region, 1],
+        aims.goals[region, 2],
+        aims.sources[region],
+        aims.counts[region],
+        sight,
     )

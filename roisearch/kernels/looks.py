@@ -21,7 +21,7 @@ OK, OUT_OF_MAP, BAD_PROBABILITY, IMPOSSIBLE, CERTAIN = 0, 1, 2, 3, 4
 
 
 def tree_offsets(cells: int) -> NDArray[np.int64]:
-    """Where each level of the sum tree over `cells` leaves starts, and the length of all levels: int [levels + 1]."""
+    """Where each level of the sum tree over `cells` leaves starts, and where the last ends: [levels + 1]."""
     offsets = [0]
     size = cells
     while True:

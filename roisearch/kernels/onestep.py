@@ -1,4 +1,4 @@
-"""One compiled call each for the planners that look no further than one trip: index rule and greedy horizon."""
+"""The planners that look no further than one trip, one compiled call each: index rule, greedy horizon."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def go_to(
     queue: Ints,
     path: Ints,
 ) -> int:
-    """Write the trip to a look at `goal` into `path`; how many cells. `field` [1, cells], [0, cells] if open."""
+    """Write the trip to a look at `goal` into `path`; how many cells. `field`: [1, cells], [0, ..] on open."""
     sources = np.empty((1, 4 * sight.offsets.shape[1], 3), dtype=np.int64)
     count = find_sources(goal, land, sight, sources[0])
     if field.shape[0] > 0:
@@ -64,7 +64,8 @@ def follow_index(
 ) -> tuple[int, int]:
     """The region with the cell most worth its distance, and how many cells of `path` lead to a look at it.
 
-    `scores` [regions] becomes each region's best weight * worth[steps]; (-1, 0) when there is nothing anywhere.
+    `scores` [regions] becomes each region's best weight * worth[steps]; (-1, 0) when there is nothing
+    anywhere.
     """
     land = Land(legal, weights.size // cols, cols)
     sight = Sight(offsets, gains, gains, is_point)

@@ -35,8 +35,8 @@ def search_policies(
 ) -> float:
     """Direct policy search: the best of `rollouts` epsilon-greedy walks of `horizon` moves goes into `path`.
 
-    With probability epsilon a move is random, else it goes to the neighbour that sees most. Returns the sum of
-    the weights seen, which fade by 1 - p_tp within a walk when `fades`.
+    With probability epsilon a move is random, else it goes to the neighbour that sees most. Returns the sum
+    of the weights seen, which fade by 1 - p_tp within a walk when `fades`.
     """
     from_row, from_col = cell // cols, cell % cols
     land = Land(legal, weights.size // cols, cols)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.ground import col_step, row_step, steps_to
 from roisearch.kernels.records import (
     DENSITY,
@@ -72,11 +72,11 @@ def hope_of_option(
     return density(row, col, region, aims, rules)
 
 
-@kernel
+@inlined
 def expand(
     node: int, row: int, col: int, tree: Tree, land: Land, mass: Mass, sight: Sight, aims: Aims, rules: Rules
 ) -> None:
-    """Make `node`: no children, no visits, and P(a) of each action from the one-step hopes; -1 marks an illegal one.
+    """Make `node`: no children, no visits, P(a) of each action from the one-step hopes, -1 if illegal.
 
     P(a) is `floor` plus the hope scaled to 0 .. 1 over the node's actions, then normalised; uniform when all
     hopes are equal.
@@ -120,7 +120,7 @@ def expand(
     tree.visits[node] = 0.0
 
 
-@kernel
+@inlined
 def select(node: int, tree: Tree, rules: Rules) -> int:
     """The action with the best PUCT score, Q + c P sqrt(N + 1) / (1 + n).
 
@@ -149,7 +149,7 @@ def select(node: int, tree: Tree, rules: Rules) -> int:
 
 @kernel
 def jump(row: int, col: int, heading: int, region: int, land: Land, aims: Aims) -> tuple[int, int, int]:
-    """Where the lite model's option ends: at the goal, or beside one that cannot be entered; row, column, heading."""
+    """Where the lite model's option ends, at its goal or beside it: row, column, heading."""
     to_row, to_col = aims.goals[region, 1], aims.goals[region, 2]
     if land.legal[aims.goals[region, 0]] == 0:
         to_row, to_col = aims.sources[region, 0, 1], aims.sources[region, 0, 2]
@@ -161,7 +161,7 @@ def jump(row: int, col: int, heading: int, region: int, land: Land, aims: Aims) 
     return to_row, to_col, heading
 
 
-@kernel
+@inlined
 def descend(
     nodes: int,
     row: int,
@@ -185,7 +185,9 @@ def descend(
             row += row_step(action)
             col += col_step(action)
             heading = action
-            reward = rules.scale * gain_at(row, col, heading, land.rows, land.cols, mass, sight) - rules.penalty
+            reward = (
+                rules.scale * gain_at(row, col, heading, land.rows, land.cols, mass, sight) - rules.penalty
+            )
             kept = rules.discount
             if mass.fades:
                 logged = fade_at(row, col, heading, land.rows, land.cols, mass, sight, logged)
@@ -222,7 +224,7 @@ def descend(
     return nodes, tree.trail.shape[0], row, col, heading, logged
 
 
-@kernel
+@inlined
 def ascend(depth: int, value: float, tree: Tree, rules: Rules) -> None:
     """Carry the return of the rollout back up the trail."""
     for step in range(depth - 1, -1, -1):

@@ -41,7 +41,8 @@ class Mass(NamedTuple):
     """Where the target may be, in the tree.
 
     `weights` [cells] is the belief's own array, which others read meanwhile: it is never written. What fades
-    in the tree is an overlay, `fade` [cells], one where nothing was seen; `log` [n] remembers what to restore.
+    in the tree is an overlay, `fade` [cells], one where nothing was seen; `log` [n] remembers what to
+    restore.
     """
 
     weights: Floats
@@ -51,11 +52,11 @@ class Mass(NamedTuple):
 
 
 class Aims(NamedTuple):
-    """Where the options go. Rows of `goals` [regions, 3] and `sources` [regions, 4 k, 3] are cell, row, column.
+    """Where the options go; rows of `goals` [regions, 3], `sources` [regions, 4 k, 3]: cell, row, column.
 
-    `counts` [regions] tells how many sources there are, `means` [regions] the mean weight of a region's cells,
-    `centroids` [regions, 2] its middle; `fields` [regions, cells] the steps to the goal around obstacles,
-    [0, cells] on open ground.
+    `counts` [regions] tells how many sources there are, `means` [regions] the mean weight of a region's
+    cells, `centroids` [regions, 2] its middle; `fields` [regions, cells] the steps to the goal around
+    obstacles, [0, cells] on open ground.
     """
 
     goals: Ints
@@ -97,9 +98,10 @@ class Rules(NamedTuple):
 class Tree(NamedTuple):
     """The search tree, a struct of arrays.
 
-    `child` [nodes, actions] is a node or -1; `stats` [nodes, 5, actions] is P(a) (-1: illegal), the sum or the best
-    of the returns, the visits n, the value, and P(a) / (1 + n); `visits` [nodes]; `trail` [depth, 4] the way down: node, action, reward, discount;
-    `span` [2] the least and the largest value so far; `decay` [n] the discount of n steps.
+    `child` [nodes, actions] is a node or -1; `stats` [nodes, 5, actions] is P(a) (-1: illegal), the sum or
+    the best of the returns, the visits n, the value, and P(a) / (1 + n); `visits` [nodes]; `trail` [depth,
+    4] the way down: node, action, reward, discount; `span` [2] the least and the largest value so far;
+    `decay` [n] the discount of n steps.
     """
 
     child: Steps

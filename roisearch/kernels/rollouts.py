@@ -36,7 +36,7 @@ def draw_unit(state: NDArray[np.uint64]) -> float:
 def random_look(
     row: int, col: int, land: Land, mass: Mass, sight: Sight, rules: Rules, state: NDArray[np.uint64]
 ) -> float:
-    """Random moves over a static map that is seen through a point: the lite model's rollout, at its barest."""
+    """Random moves over a static map seen through a point: the lite model's rollout, at its barest."""
     cell = row * land.cols + col
     now = state[0]
     total, kept = 0.0, 1.0

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.records import Mass, Sight
 
 
-@kernel
+@inlined
 def gain_at(row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, sight: Sight) -> float:
     """The weight in the field of view, each cell times its gain."""
     if sight.is_point:
@@ -28,7 +28,9 @@ def gain_at(row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, 
 
 
 @kernel
-def fade_at(row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, sight: Sight, logged: int) -> int:
+def fade_at(
+    row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, sight: Sight, logged: int
+) -> int:
     """Let what is seen from here fade by 1 - p_tp, as the paper does in the tree.
 
     The cells go into the log, beginning at `logged`; returns how many are in it now. When the log is full

@@ -12,7 +12,7 @@ from roisearch.kernels.sensing import gain_at
 def trip_move(
     row: int, col: int, heading: int, region: int, land: Land, mass: Mass, sight: Sight, aims: Aims
 ) -> tuple[int, bool]:
-    """The next move of the trip to the goal of `region`, and whether it ends there; (-1, False) if there is none.
+    """The next move of the trip to the goal of `region`, and whether it ends there; (-1, False) if none.
 
     The nearest way, and of equally near ones the one that sees most; of equal ones again straight on, right,
     left, back, in this order.
@@ -38,7 +38,15 @@ def trip_move(
 
 @kernel
 def walk_trip(
-    row: int, col: int, heading: int, region: int, land: Land, mass: Mass, sight: Sight, aims: Aims, path: Ints
+    row: int,
+    col: int,
+    heading: int,
+    region: int,
+    land: Land,
+    mass: Mass,
+    sight: Sight,
+    aims: Aims,
+    path: Ints,
 ) -> int:
     """Write the cells of the trip to the goal of `region` into `path`, as many as fit; how many there are."""
     length = 0

@@ -58,8 +58,8 @@ class Scene:
 
     Attributes:
         ground: the flyable ground, and `part` the connected piece of it that the drone is on.
-        forest: tree 0 is the viewable ground outside all regions, 1 .. regions the regions of interest, and the
-            last one what cannot be seen from this part.
+        forest: tree 0 is the viewable ground outside all regions, 1 .. regions the regions of interest, and
+            the last one what cannot be seen from this part.
         centroids: float [1 + regions, 2].
     """
 
@@ -146,11 +146,13 @@ def remark_on(unreachable: float) -> str:
 
 
 def any_move(scene: Scene, state: SearchState, began: float, unreachable: float) -> Decision:
-    """The first legal move, straight on, right, left, back: when nothing that can be seen has any probability."""
+    """The first legal move, straight on, right, left, back: for when all that can be seen is at zero."""
     cols = scene.ground.shape[1]
     at, heading = state.cell[0] * cols + state.cell[1], heading_index(state.heading)
     legal = int(scene.part.legal[at])
-    move = next(h for h in (heading, (heading + 1) & 3, (heading + 3) & 3, (heading + 2) & 3) if legal >> h & 1)
+    move = next(
+        h for h in (heading, (heading + 1) & 3, (heading + 3) & 3, (heading + 2) & 3) if legal >> h & 1
+    )
     path = (divmod(at + cell_step(move, cols), cols),)
     effort = Effort(0, time.perf_counter() - began)
     return Decision(path, HEADINGS[move], 0.0, effort, unreachable, remark_on(unreachable))

@@ -19,9 +19,9 @@ from roisearch.regions import Regions
 class GreedyPlanner:
     """Moves towards the cell from which most mass is seen among those within `horizon` steps.
 
-    Of equally good cells the nearest wins, and of equally near ones the one found straight on, right, left, back
-    in this order. The drone's own cell does not count. When no cell within the horizon sees any mass at all,
-    it makes the first legal move in the same order.
+    Of equally good cells the nearest wins, and of equally near ones the one found straight on, right, left,
+    back in this order. The drone's own cell does not count. When no cell within the horizon sees any mass at
+    all, it makes the first legal move in the same order.
 
     Args:
         fov, flyable, regions: see `make_planner`.
@@ -56,14 +56,14 @@ class GreedyPlanner:
         *,
         deadline_s: float | None = None,
     ) -> Decision:
-        """Where to go next: see `Planner.plan`. Draws nothing, needs no deadline; its value is a probability."""
+        """Where to go next: see `Planner.plan`. Draws nothing; its value is a probability."""
         began = time.perf_counter()
         scene: Scene = self._world.scene(belief, state.cell)
         cols = scene.ground.shape[1]
         value, length = follow_horizon(
             state.cell[0] * cols + state.cell[1], heading_index(state.heading), self._horizon, belief.weights,
-            scene.part.legal, cols, self._fov.offsets, self._gains, self._fov.is_point, self._window, self._queue,
-            self._path,
+            scene.part.legal, cols, self._fov.offsets, self._gains, self._fov.is_point, self._window,
+            self._queue, self._path,
         )  # fmt: skip
         unreachable = scene.unreachable(belief, belief.sums_of(scene.forest))
         if length == 0:

@@ -82,7 +82,7 @@ class IndexPlanner:
         *,
         deadline_s: float | None = None,
     ) -> Decision:
-        """Where to go next: see `Planner.plan`. Draws nothing, needs no deadline; its value is m ** alpha / steps."""
+        """Where to go next: see `Planner.plan`. Draws nothing; its value is m ** alpha / steps."""
         began = time.perf_counter()
         scene = self._world.scene(belief, state.cell)
         if scene is not self._scene:

@@ -17,10 +17,10 @@ from roisearch.regions import Regions
 
 
 class PatternPlanner:
-    """Enters the cells of a pattern in order, around obstacles on the shortest way, and begins again at its end.
+    """Enters the cells of a pattern in order, around obstacles on the shortest way, then begins again.
 
-    The planner keeps its own place in the pattern; the belief plays a part only where the pattern is made, and when
-    one cell has become very likely: then that cell is looked at until it is not.
+    The planner keeps its own place in the pattern; the belief plays a part only where the pattern is made,
+    and when one cell has become very likely: then that cell is looked at until it is not.
 
     Args:
         fov, flyable, regions: see `make_planner`.
@@ -72,7 +72,7 @@ class PatternPlanner:
         *,
         deadline_s: float | None = None,
     ) -> Decision:
-        """Where to go next: see `Planner.plan`. Draws nothing; its value is the mass of the cell it goes to."""
+        """Where to go next: see `Planner.plan`. Draws nothing; its value is the mass of its goal."""
         began = time.perf_counter()
         scene = self._world.scene(belief, state.cell)
         if scene is not self._scene:
@@ -170,9 +170,9 @@ class SpiralPlanner(PatternPlanner):
     name = "spiral"
 
     def _pattern(self, scene: Scene, belief: Belief) -> NDArray[np.int64]:
-        rows, cols = scene.ground.shape
+        cols = scene.ground.shape[1]
         centre = scene.likeliest(belief, belief.sums_of(scene.forest))
-        cells = np.flatnonzero((scene.part.legal > 0) & (belief.weights > 0.0))
+        cells: NDArray[np.int64] = np.flatnonzero((scene.part.legal > 0) & (belief.weights > 0.0))
         if centre < 0 or cells.size == 0:
             return cells
         down, right = cells // cols - centre // cols, cells % cols - centre % cols
@@ -181,7 +181,10 @@ class SpiralPlanner(PatternPlanner):
         place = np.where(
             (down == -ring) & (right > -ring),
             right + ring,
-            np.where(right == ring, 3 * ring + down, np.where(down == ring, 5 * ring - right, 7 * ring - down)),
+            np.where(
+                right == ring, 3 * ring + down, np.where(down == ring, 5 * ring - right, 7 * ring - down)
+            ),
         )
         kept = ring % self._swath == 0
-        return cells[kept][np.lexsort((place[kept], ring[kept]))]
+        ordered: NDArray[np.int64] = cells[kept][np.lexsort((place[kept], ring[kept]))]
+        return ordered

@@ -20,9 +20,10 @@ _CHUNK = 100
 
 
 class DirectPolicySearch:
-    """Walks `rollouts` times, each move random with probability epsilon and greedy else, and takes the best walk.
+    """Walks `rollouts` times, each move random with probability epsilon, else greedy; takes the best walk.
 
-    The paper gives epsilon and the horizon; the number of rollouts, and that the best single walk is followed, are ours.
+    The paper gives epsilon and the horizon; the number of rollouts, and that the best single walk is
+    followed, are ours.
 
     Args:
         fov, flyable, regions: see `make_planner`.
@@ -73,7 +74,7 @@ class DirectPolicySearch:
         if scene is not self._scene:
             self._scene = scene
             self._fade = np.ones(rows * cols if self._fades else 1)
-        self._random[0] = rng.bit_generator.random_raw()  # type: ignore[attr-defined]
+        self._random[0] = rng.bit_generator.random_raw()
         at, heading = state.cell[0] * cols + state.cell[1], heading_index(state.heading)
         done, best = 0, -1.0
         while done < self._rollouts:

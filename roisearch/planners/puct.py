@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -71,7 +72,7 @@ class PuctPlanner:
         self._random = np.zeros(1, dtype=np.uint64)
         self._shown = np.zeros((actions, 2))
         self._path = np.zeros(rows + cols + 64, dtype=np.int64)
-        self._before = (
+        self._arrays: tuple[Any, ...] = (
             forest.cell_of,
             forest.first,
             forest.last,
@@ -114,8 +115,6 @@ class PuctPlanner:
             s.factor / s.area**2,
             s.alpha,
             s.floor,
-        )
-        self._after = (
             np.zeros((nodes, actions), dtype=np.int32),  # child
             np.zeros((nodes, 5, actions)),  # stats
             np.zeros(nodes),  # visits
@@ -147,7 +146,7 @@ class PuctPlanner:
                 return self._go_on(belief, scene, sums, self._trip, rest, began)
             if rest and self.settings.commit == "margin":
                 held = self._trip.action
-        self._random[0] = rng.bit_generator.random_raw()  # type: ignore[attr-defined]
+        self._random[0] = rng.bit_generator.random_raw()
         row, col = state.cell
         cols = scene.ground.shape[1]
         at, heading = row * cols + col, heading_index(state.heading)
@@ -161,8 +160,8 @@ class PuctPlanner:
             if deadline_s is not None:
                 chunk = min(chunk, _CHUNK)
             nodes, action, length = decide(
-                at, heading, nodes, chunk, held, self._random, belief.weights, sums.sums, sums.peaks,
-                *self._before, scale, *self._after,
+                at, heading, nodes, chunk, held, scale, self._random, belief.weights, sums.sums, sums.peaks,
+                *self._arrays,
             )  # fmt: skip
             done += chunk
             if done == most or (deadline_s is not None and time.perf_counter() - began >= deadline_s):
@@ -184,7 +183,13 @@ class PuctPlanner:
         )
 
     def _go_on(
-        self, belief: Belief, scene: Scene, sums: ForestSums, trip: _Trip, rest: tuple[Cell, ...], began: float
+        self,
+        belief: Belief,
+        scene: Scene,
+        sums: ForestSums,
+        trip: _Trip,
+        rest: tuple[Cell, ...],
+        began: float,
     ) -> Decision:
         """The rest of the trip that the planner is committed to."""
         unreachable = scene.unreachable(belief, sums)
@@ -194,7 +199,7 @@ class PuctPlanner:
         )
 
     def warm_up(self, progress: Progress | None = None) -> None:
-        """Compile every kernel that a decision and an observation use, by making some on a small map."""
+        """Compile every kernel that a decision and an observation use."""
         warm_up(PuctPlanner(self.name, self.settings, fov=self._fov), self._fov, progress)
 
 

@@ -29,26 +29,27 @@ class PuctSettings:
             draws each move; "repeat" repeats one drawn move (reference code).
         explore: c of the PUCT score. Paper: 0.5.
         discount: of each further step; the paper has none, the reference code 0.99.
-        penalty: d, the time penalty of a step, in probability; None for 1 / number of cells. The paper gives no
-            value; of this order, a step on empty ground is worth less than an option.
+        penalty: d, the time penalty of a step, in probability; None for 1 / number of cells. The paper gives
+            no value; of this order, a step on empty ground is worth less than an option.
         gain: what a look at a cell counts: its "mass" (paper), or its chance of "detection", p_tp * mass.
         options: whether there are options to go to the regions.
         elsewhere: whether the ground outside all regions is one more region to go to.
         goal: where an option goes: "peak", the region's most probable cell (paper), or "index", its cell with
             the largest m ** alpha / steps from the drone.
-        option_reward: "density", the lite model's f * mean mass / (A^2 * distance), or "trip", what the option
-            sees on its way, as in the BMDP-O.
+        option_reward: "density", the lite model's f * mean mass / (A^2 * distance), or "trip", what the
+            option sees on its way, as in the BMDP-O.
         factor: f of the lite model. Paper: 8e-6.
-        area: A of the lite model, in maps. With the whole map as the unit the printed f makes an option worth a
-            little more than nothing, and a step on empty ground is worth a little less than nothing.
+        area: A of the lite model, in maps. With the whole map as the unit the printed f makes an option
+            worth a little more than nothing, and a step on empty ground is worth a little less than nothing.
         fades: whether what the tree has seen fades by 1 - p_tp (the paper's in-tree belief update).
         backup: "mean" or "max" of the returns. The model is deterministic, so the best return is attainable.
         normalise: scale Q to 0 .. 1 over the tree's values before the exploration term is added; else the
             sum of returns / (1 + n), as in the reference code.
         prior: P(a) from the one-step "rewards" (paper), from m ** alpha / steps ("index"), or "uniform".
         choose: the root action with most "visits" or the best "value".
-        commit: "trip" flies a chosen option to its end unless a hit arrives (reference code); "margin" keeps it
-            unless a new search finds an option better by more than `margin`; "never" starts afresh each time.
+        commit: "trip" flies a chosen option to its end unless a hit arrives (reference code); "margin" keeps
+            it unless a new search finds an option better by more than `margin`; "never" starts afresh each
+            time.
         margin: how much better, relative to the kept option's value.
         floor: what the least promising action gets of P(a), the best getting 1 + floor, before scaling.
         alpha: exponent of the mass in "index".

@@ -11,7 +11,7 @@ from roisearch.planners.base import Planner, Progress
 
 
 def warm_up(planner: Planner, fov: FieldOfView, progress: Progress | None) -> None:
-    """Compile what a belief and a fresh `planner` need; `progress` is told before each step and at the end."""
+    """Compile what a belief and a fresh `planner` need; `progress` is told each step and the end."""
 
     def say(step: str, number: int) -> None:
         if progress is not None:

@@ -76,14 +76,14 @@ def level_of(mass: float, scale: float) -> int:
 
 
 @kernel
-def recompute_block(chart: Chart, block_row: int, block_col: int) -> None:
-    """The largest worth in a block, over the cells that can be entered."""
+def largest_in_block(worth: Floats, rows: int, cols: int, block_row: int, block_col: int) -> float:
+    """The largest worth in a block."""
     best = 0.0
-    for row in range(block_row * BLOCK, min(block_row * BLOCK + BLOCK, chart.rows)):
-        start = row * chart.cols + block_col * BLOCK
-        for cell in range(start, row * chart.cols + min(block_col * BLOCK + BLOCK, chart.cols)):
-            best = max(best, chart.worth[cell])
-    chart.peaks[block_row, block_col] = best
+    for row in range(block_row * BLOCK, min(block_row * BLOCK + BLOCK, rows)):
+        for cell in range(row * cols + block_col * BLOCK, row * cols + min(block_col * BLOCK + BLOCK, cols)):
+            if worth[cell] > best:
+                best = worth[cell]
+    return best
 
 
 @kernel
@@ -114,7 +114,8 @@ def draw_up(chart: Chart) -> None:
     for cell in range(chart.mass.size):
         most = max(most, chart.mass[cell])
     chart.scale[0] = most if most > 0.0 else 1.0
-    chart.levels[:] = 0.0
+    for level in range(LEVELS):
+        chart.levels[level, 0] = chart.levels[level, 1] = 0.0
     for row in range(chart.rows):
         for col in range(chart.cols):
             cell = row * chart.cols + col
@@ -126,10 +127,18 @@ def draw_up(chart: Chart) -> None:
                 chart.worth[cell] = worth_at(chart, row, col) if chart.legal[cell] else 0.0
     for row in range(chart.peaks.shape[0]):
         for col in range(chart.peaks.shape[1]):
-            recompute_block(chart, row, col)
+            chart.peaks[row, col] = largest_in_block(chart.worth, chart.rows, chart.cols, row, col)
     for row in range(chart.tops.shape[0]):
         for col in range(chart.tops.shape[1]):
             recompute_area(chart, row, col)
+
+
+@kernel
+def copy_table(source: Floats, target: Floats) -> None:
+    """Copy float [rows, cols] cell by cell (a slice would need memory)."""
+    for row in range(source.shape[0]):
+        for col in range(source.shape[1]):
+            target[row, col] = source[row, col]
 
 
 @kernel
@@ -137,8 +146,8 @@ def begin(chart: Chart) -> None:
     """Start a simulation that `restore` will undo."""
     chart.counters[SIMULATION] += 1
     chart.counters[KEPT] = 0
-    chart.old_tops[:] = chart.tops
-    chart.old_levels[:] = chart.levels
+    copy_table(chart.tops, chart.old_tops)
+    copy_table(chart.levels, chart.old_levels)
 
 
 @kernel
@@ -180,8 +189,8 @@ def restore(chart: Chart) -> None:
                 chart.worth[row * chart.cols + col] = chart.old[place, 1, i]
                 i += 1
     chart.counters[KEPT] = 0
-    chart.tops[:] = chart.old_tops
-    chart.levels[:] = chart.old_levels
+    copy_table(chart.old_tops, chart.tops)
+    copy_table(chart.old_levels, chart.levels)
 
 
 @kernel
@@ -197,7 +206,8 @@ def change(chart: Chart, row: int, col: int, mass: float, kept: bool) -> None:
     if level >= 0:
         chart.levels[level, 0] += 1.0
         chart.levels[level, 1] += mass
-    if kept:
+    block = (row // BLOCK) * chart.peaks.shape[1] + col // BLOCK
+    if kept and chart.stamp[block] != chart.counters[SIMULATION]:
         keep(chart, row // BLOCK, col // BLOCK)
     chart.mass[cell] = mass
     if chart.is_point:
@@ -228,7 +238,9 @@ def refresh(chart: Chart, row: int, col: int, last_row: int, last_col: int, befo
             if before < was and chart.is_point:
                 chart.peaks[block_row, block_col] = max(was, chart.worth[cell])
             else:
-                recompute_block(chart, block_row, block_col)
+                chart.peaks[block_row, block_col] = largest_in_block(
+                    chart.worth, chart.rows, chart.cols, block_row, block_col
+                )
             now = chart.peaks[block_row, block_col]
             area_row, area_col = block_row // BLOCK, block_col // BLOCK
             if now > chart.tops[area_row, area_col]:

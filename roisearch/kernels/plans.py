@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.kernels.chart import Chart, Floats, Ints, begin, restore, time_to_clear
+from roisearch.kernels.chart import Chart, Floats, Ints, begin, copy_table, restore, time_to_clear
 from roisearch.kernels.compiled import kernel
 from roisearch.kernels.sweeps import (
     ANYWHERE,
@@ -68,7 +68,8 @@ class Tree(NamedTuple):
     the same of the line being tried.
     at: int [nodes], where on the path a node stands. stats: float [nodes, actions, 3]: P(a), least loss (of
     keeping to the plan: 0), visits. Actions: 0-3 moves, 4 anywhere, 4 + k region k, last: keep to the plan.
-    worths: float [nodes, regions + 1], the largest worth in each region.
+    worths: float [nodes, regions + 1], the largest worth in each region. scores: float [regions + 1],
+    room.
     value: float [EXPECTED, ...], area under the survival curve of the plan, the rest included.
     """
 
@@ -80,6 +81,7 @@ class Tree(NamedTuple):
     at: Ints
     stats: Floats
     worths: Floats
+    scores: Floats
     value: Floats
 
 
@@ -93,6 +95,20 @@ def draw(state: NDArray[np.uint64]) -> float:
     """A number from 0 to just below 1, from a 64-bit linear congruential generator (Knuth's MMIX constants)."""
     state[0] = state[0] * MULTIPLIER + INCREMENT
     return float(np.int64(state[0] >> np.uint64(11))) * 2.0**-53
+
+
+@kernel
+def fill(array: Ints, first: int, last: int, value: int) -> None:
+    """array[first:last] = value."""
+    for i in range(first, last):
+        array[i] = value
+
+
+@kernel
+def copy_range(source: Ints, target: Ints, first: int, last: int) -> None:
+    """target[first:last] = source[first:last]."""
+    for i in range(first, last):
+        target[i] = source[i]
 
 
 @kernel
@@ -136,9 +152,9 @@ def extend(
     )
     more, undetected, steps, row, col, heading = sweep(
         row, col, heading, chart, rules.nears[0], labels, home, ANYWHERE, 0.0, now + horizon - length,
-        undetected, tree.path[length:], wave,
+        undetected, tree.path, length, wave,
     )  # fmt: skip
-    tree.action[length : length + steps] = ANYWHERE
+    fill(tree.action, length, length + steps, ANYWHERE)
     tree.mark[LENGTH] = length + steps
     tree.value[EXPECTED] = area + more + rest(chart, undetected, rules)
     restore(chart)
@@ -159,16 +175,17 @@ def add_node(
     """A new last node, with P(a) of its actions."""
     tree.mark[NODES] = node + 1
     tree.at[node] = at
-    stats = tree.stats[node]
-    stats[:] = 0.0
+    stats, scores = tree.stats[node], tree.scores
+    for action in range(stats.shape[0]):
+        stats[action, P_A] = stats[action, LOSS] = stats[action, N_A] = 0.0
     regions = tree.worths.shape[1]
-    scores = np.zeros(regions)
     region_scores(row, col, chart, rules.nears[0], labels, home, scores, tree.worths[node])
-    total = scores.max()
+    best = total = 0.0
     for region in range(regions):
+        best = max(best, scores[region])
         total += scores[region] if region > 0 else 0.0
-    share = (1.0 - rules.keep) / total if total > 0.0 else 0.0
-    stats[4, P_A] = share * scores.max()
+    share = (1.0 - rules.keep) / (best + total) if best > 0.0 else 0.0
+    stats[4, P_A] = share * best
     for region in range(1, regions):
         stats[4 + region, P_A] = share * scores[region]
     stats[stats.shape[0] - 1, P_A] = rules.keep
@@ -263,14 +280,14 @@ def iterate(
     most = min(most, end - t)
     more, undetected, steps, row, col, heading = sweep(
         row, col, heading, chart, rules.nears[balance], labels, home, region, floor, most, undetected,
-        tree.trial[t:], wave,
+        tree.trial, t, wave,
     )  # fmt: skip
     area += more
     turned = t + steps
     follower = int(draw(state) * rules.followers) if draw(state) < 0.3 else 0
     more, undetected, steps, row, col, heading = sweep(
         row, col, heading, chart, rules.nears[follower], labels, home, ANYWHERE, 0.0, end - turned, undetected,
-        tree.trial[turned:], wave,
+        tree.trial, turned, wave,
     )  # fmt: skip
     area += more + rest(chart, undetected, rules)
     restore(chart)
@@ -290,9 +307,9 @@ def iterate(
 @kernel
 def adopt(node: int, begun: int, turned: int, end: int, region: int, loss: float, tree: Tree) -> None:
     """Make the trial the plan: it leaves the plan at `begun` and sweeps `region` until `turned`."""
-    tree.path[begun:end] = tree.trial[begun:end]
-    tree.action[begun:turned] = region
-    tree.action[turned:end] = ANYWHERE
+    copy_range(tree.trial, tree.path, begun, end)
+    fill(tree.action, begun, turned, region)
+    fill(tree.action, turned, end, ANYWHERE)
     tree.value[EXPECTED] += loss
     tree.mark[NODES] = node + 1
     keep = tree.stats.shape[1] - 1
@@ -342,12 +359,13 @@ def settle_root(
         left = tree.mark[NODES] - passed + 1
         for node in range(left):
             tree.at[node] = tree.at[node + passed - 1]
-            tree.stats[node] = tree.stats[node + passed - 1]
-            tree.worths[node] = tree.worths[node + passed - 1]
+            copy_table(tree.stats[node + passed - 1], tree.stats[node])
+            for region in range(tree.worths.shape[1]):
+                tree.worths[node, region] = tree.worths[node + passed - 1, region]
         tree.mark[NODES] = left
     if tree.at[0] < now:
         for move in range(4):
-            tree.stats[0, move] = 0.0
+            tree.stats[0, move, LOSS] = tree.stats[0, move, N_A] = 0.0
     tree.at[0] = now
     open_moves(row, col, chart, tree, rules)
 
@@ -384,9 +402,9 @@ def replan(
         while old_steps < horizon:
             more, undetected, steps, row, col, heading = sweep(
                 row, col, heading, chart, rules.nears[0], labels, home, region, 0.0,
-                min(most, horizon - old_steps), undetected, tree.trial[old_steps:], wave,
+                min(most, horizon - old_steps), undetected, tree.trial, old_steps, wave,
             )  # fmt: skip
-            tree.trial_action[old_steps : old_steps + steps] = region
+            fill(tree.trial_action, old_steps, old_steps + steps, region)
             old_area += more
             old_steps += steps
             if i >= length:
@@ -406,17 +424,17 @@ def replan(
     begin(chart)
     area, undetected, steps, row, col, heading = sweep(
         row, col, heading, chart, rules.nears[0], labels, home, ANYWHERE, 0.0, horizon, tree.value[UNDETECTED],
-        tree.path, wave,
+        tree.path, 0, wave,
     )  # fmt: skip
     area += rest(chart, undetected, rules)
     restore(chart)
     tree.mark[NOW] = 0
     if old_area < area and old_steps >= steps:
-        tree.path[:old_steps] = tree.trial[:old_steps]
-        tree.action[:old_steps] = tree.trial_action[:old_steps]
+        copy_range(tree.trial, tree.path, 0, old_steps)
+        copy_range(tree.trial_action, tree.action, 0, old_steps)
         tree.mark[LENGTH] = old_steps
         tree.value[EXPECTED] = old_area
     else:
-        tree.action[:steps] = ANYWHERE
+        fill(tree.action, 0, steps, ANYWHERE)
         tree.mark[LENGTH] = steps
         tree.value[EXPECTED] = area

@@ -20,6 +20,8 @@ from roisearch.kernels.chart import AREA, BLOCK, Chart, Floats, Ints, gain_from,
 from roisearch.kernels.compiled import kernel
 
 ANYWHERE = -1
+RING, HOLD = 2, 4
+"""Blocks around the drone's own that are looked through at every step; steps for which `far_limit` holds."""
 
 
 class Wave(NamedTuple):
@@ -78,7 +80,9 @@ def scan_block(
     block_col: int,
     row: int,
     col: int,
-    chart: Chart,
+    rows: int,
+    cols: int,
+    worths: Floats,
     near: Floats,
     labels: NDArray[np.int32],
     region: int,
@@ -87,18 +91,20 @@ def scan_block(
     best: float,
 ) -> tuple[int, float]:
     """The best cell of a block, if it is better than `best`; neighbours of the drone and its own cell excluded."""
-    for r in range(block_row * BLOCK, min(block_row * BLOCK + BLOCK, chart.rows)):
+    enough = max(floor, best / near[2])
+    for r in range(block_row * BLOCK, min(block_row * BLOCK + BLOCK, rows)):
         apart = abs(r - row)
-        for c in range(block_col * BLOCK, min(block_col * BLOCK + BLOCK, chart.cols)):
-            worth = chart.worth[r * chart.cols + c]
-            if worth * near[2] <= best or worth < floor:
+        for c in range(block_col * BLOCK, min(block_col * BLOCK + BLOCK, cols)):
+            worth = worths[r * cols + c]
+            if worth < enough:
                 continue
             steps = apart + abs(c - col)
             if steps < 2 or worth * near[steps] <= best:
                 continue
-            if region >= 0 and labels[r * chart.cols + c] != region:
+            if region >= 0 and labels[r * cols + c] != region:
                 continue
-            best_cell, best = r * chart.cols + c, worth * near[steps]
+            best_cell, best = r * cols + c, worth * near[steps]
+            enough = max(floor, best / near[2])
     return best_cell, best
 
 
@@ -108,6 +114,68 @@ def gap(at: int, first: int, size: int) -> int:
     if at < first:
         return first - at
     return max(0, at - (first + size - 1))
+
+
+@kernel
+def far_limit(
+    row: int, col: int, chart: Chart, near: Floats, home: NDArray[np.int32], region: int, floor: float
+) -> float:
+    """No cell more than RING blocks from the drone can score more, now or in the next HOLD steps.
+
+    Worth only falls in a simulation, and distances shrink by one in a step.
+    """
+    limit = 0.0
+    own_row, own_col = row // BLOCK, col // BLOCK
+    for area_row in range(chart.tops.shape[0]):
+        far_row = gap(row, area_row * AREA, AREA)
+        for area_col in range(chart.tops.shape[1]):
+            apart = far_row + gap(col, area_col * AREA, AREA)
+            top = chart.tops[area_row, area_col]
+            if top < floor or top * near[max(1, apart - HOLD)] <= limit:
+                continue
+            if region < 0 and apart > (RING + 2) * BLOCK:
+                limit = top * near[apart - HOLD]
+                continue
+            for block_row in range(area_row * BLOCK, min(area_row * BLOCK + BLOCK, chart.peaks.shape[0])):
+                apart_row = gap(row, block_row * BLOCK, BLOCK)
+                for block_col in range(area_col * BLOCK, min(area_col * BLOCK + BLOCK, chart.peaks.shape[1])):
+                    if abs(block_row - own_row) <= RING and abs(block_col - own_col) <= RING:
+                        continue
+                    lives = home[block_row * chart.peaks.shape[1] + block_col]
+                    peak = chart.peaks[block_row, block_col]
+                    if peak < floor or (region >= 0 and lives >= 0 and lives != region):
+                        continue
+                    apart = apart_row + gap(col, block_col * BLOCK, BLOCK)
+                    limit = max(limit, peak * near[max(1, apart - HOLD)])
+    return limit
+
+
+@kernel
+def best_close(
+    row: int,
+    col: int,
+    chart: Chart,
+    near: Floats,
+    labels: NDArray[np.int32],
+    region: int,
+    floor: float,
+    best: float,
+) -> tuple[int, float]:
+    """As `best_far`, but only RING blocks around the drone's own."""
+    own_row, own_col = row // BLOCK, col // BLOCK
+    cell = -1
+    cell, best = scan_block(own_row, own_col, row, col, chart.rows, chart.cols, chart.worth, near, labels, region, floor, cell, best)
+    for block_row in range(max(0, own_row - RING), min(chart.peaks.shape[0], own_row + RING + 1)):
+        apart = gap(row, block_row * BLOCK, BLOCK)
+        for block_col in range(max(0, own_col - RING), min(chart.peaks.shape[1], own_col + RING + 1)):
+            if block_row == own_row and block_col == own_col:
+                continue
+            peak = chart.peaks[block_row, block_col]
+            if peak >= floor and peak * near[max(1, apart + gap(col, block_col * BLOCK, BLOCK))] > best:
+                cell, best = scan_block(
+                    block_row, block_col, row, col, chart.rows, chart.cols, chart.worth, near, labels, region, floor, cell, best
+                )
+    return cell, best
 
 
 @kernel
@@ -124,8 +192,6 @@ def best_far(
 ) -> tuple[int, float]:
     """The best cell two or more steps away on open ground, if its score is above `best`; (-1, best) if none is."""
     cell = -1
-    own_row, own_col = row // BLOCK, col // BLOCK
-    cell, best = scan_block(own_row, own_col, row, col, chart, near, labels, region, floor, cell, best)
     for area_row in range(chart.tops.shape[0]):
         far_row = gap(row, area_row * AREA, AREA)
         for area_col in range(chart.tops.shape[1]):
@@ -141,10 +207,8 @@ def best_far(
                     lives = home[block_row * chart.peaks.shape[1] + block_col]
                     if region >= 0 and lives >= 0 and lives != region:
                         continue
-                    if block_row == own_row and block_col == own_col:
-                        continue
                     cell, best = scan_block(
-                        block_row, block_col, row, col, chart, near, labels, region, floor, cell, best
+                        block_row, block_col, row, col, chart.rows, chart.cols, chart.worth, near, labels, region, floor, cell, best
                     )
     return cell, best
 
@@ -163,8 +227,9 @@ def best_wave(
 ) -> tuple[int, float]:
     """As `best_far`, with true distances around obstacles; leaves the way back in `wave.origin`."""
     top = 0.0
-    for area in range(chart.tops.size):
-        top = max(top, chart.tops.flat[area])
+    for area_row in range(chart.tops.shape[0]):
+        for area_col in range(chart.tops.shape[1]):
+            top = max(top, chart.tops[area_row, area_col])
     wave.count[0] += 1
     number = wave.count[0]
     start = row * chart.cols + col
@@ -216,12 +281,16 @@ def next_move(
     home: NDArray[np.int32],
     region: int,
     floor: float,
+    limit: float,
     wave: Wave,
 ) -> int:
-    """The next move of the sweep; -1 when nothing is left to sweep."""
+    """The next move of the sweep; -1 when nothing is left to sweep. `limit` is from `far_limit`."""
     move, score = best_neighbour(row, col, heading, chart, near, labels, region, floor)
     if chart.is_open:
-        cell, score = best_far(row, col, chart, near, labels, home, region, floor, score)
+        cell, score = best_close(row, col, chart, near, labels, region, floor, score)
+        if score < limit:
+            other, score = best_far(row, col, chart, near, labels, home, region, floor, score)
+            cell = other if other >= 0 else cell
         return move if cell < 0 else move_towards(row, col, cell, chart)
     cell, score = best_wave(row, col, chart, near, labels, region, floor, score, wave)
     if cell < 0:
@@ -251,20 +320,24 @@ def sweep(
     most: int,
     undetected: float,
     path: Ints,
+    first: int,
     wave: Wave,
 ) -> tuple[float, float, int, int, int, int]:
     """Follow the rule for at most `most` steps, seeing nothing.
 
     Args:
         undetected: the mass not detected before.
-        path: int [most or more], receives the cells entered.
+        path: int [first + most or more], receives the cells entered, from `first` on.
 
     Returns the area under the survival curve, the mass not detected afterwards, the steps, and the pose.
     """
     area = 0.0
     steps = 0
+    limit = np.inf
     while steps < most and not is_full(chart):
-        move = next_move(row, col, heading, chart, near, labels, home, region, floor, wave)
+        if chart.is_open and steps % HOLD == 0:
+            limit = far_limit(row, col, chart, near, home, region, floor)
+        move = next_move(row, col, heading, chart, near, labels, home, region, floor, limit, wave)
         if move < 0:
             break
         row += row_of_move(move)
@@ -272,7 +345,7 @@ def sweep(
         heading = move
         area += undetected
         undetected = max(0.0, undetected - look(chart, row, col, heading, True))
-        path[steps] = row * chart.cols + col
+        path[first + steps] = row * chart.cols + col
         steps += 1
     return area, undetected, steps, row, col, heading
 
@@ -311,8 +384,8 @@ def region_scores(
     scores, worths: float [regions + 1]; the index is the label. Distances are rows and columns, also around
     obstacles: this only says what to try first.
     """
-    scores[:] = 0.0
-    worths[:] = 0.0
+    for label in range(scores.size):
+        scores[label] = worths[label] = 0.0
     for block_row in range(chart.peaks.shape[0]):
         apart = gap(row, block_row * BLOCK, BLOCK)
         for block_col in range(chart.peaks.shape[1]):

@@ -16,7 +16,7 @@ from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
 from roisearch.planners.base import Progress, Scene, World, cells_of
-from roisearch.regions import Regions
+from roisearch.regions import Regions, segment_regions
 
 ROLLOUT_BALANCES = ((0.4, 1.0), (0.33, 1.0), (0.45, 1.0), (0.4, 2.0), (0.4, 0.3), (0.5, 2.0))
 OPTION_BALANCES = ((0.25, 1.0), (0.6, 0.0), (1.0, 0.0), (0.4, 4.0))
@@ -109,7 +109,9 @@ class SweepPlanner:
         self.name = name
         self.settings = settings or SweepSettings()
         self._fov = fov
-        self._world = World(fov, flyable, regions)
+        self._flyable = None if flyable is None else np.array(flyable, dtype=bool)
+        self._regions = regions
+        self._world: World | None = None
         self._watch: Any = Watch()
         self._scene: Scene | None = None
         self._belief: Belief | None = None
@@ -154,9 +156,10 @@ class SweepPlanner:
         )
         room = 0 if scene.ground.is_open else cells
         self._wave = Wave(*(np.zeros(room, dtype=np.int64) for _ in range(4)), np.zeros(1, dtype=np.int64))
-        regions = self._world.regions(belief)
+        regions = self._regions
+        assert regions is not None
         self._labels = nearest_labels(regions.labels)
-        self._home = homes(self._labels, blocks)
+        self._home = homes(self._labels, (rows, cols))
         most = 3 * s.horizon + 4096
         self._tree = plans.Tree(
             path=np.zeros(most, dtype=np.int64),
@@ -167,6 +170,7 @@ class SweepPlanner:
             at=np.zeros(2 + s.horizon // s.spacing, dtype=np.int64),
             stats=np.zeros((2 + s.horizon // s.spacing, 6 + regions.count, 3)),
             worths=np.zeros((2 + s.horizon // s.spacing, 1 + regions.count)),
+            scores=np.zeros(1 + regions.count),
             value=np.zeros(2),
         )
         self._rules = self._make_rules(rows, cols, scene.ground.is_open)
@@ -211,6 +215,11 @@ class SweepPlanner:
         began = time.perf_counter()
         if self.settings.iterations is None and deadline_s is None:
             raise ValueError("a planner without a number of iterations needs a deadline")
+        if self._world is None:
+            if self._regions is None:
+                prior = belief.probability()
+                self._regions = segment_regions(prior, searchable=prior > 0.0)
+            self._world = World(self._fov, self._flyable, self._regions)
         scene = self._world.scene(belief, state.cell)
         if scene is not self._scene:
             self._enter(belief, scene)
@@ -322,7 +331,7 @@ class SweepPlanner:
         """The next cells of the plan, and what was thought of the other actions."""
         tree, cols = self._tree, self._chart.cols
         now, length = int(tree.mark[plans.NOW]), int(tree.mark[plans.LENGTH])
-        unreachable = scene.unreachable(belief)
+        unreachable = scene.unreachable(belief, belief.sums_of(scene.forest))
         if length == now:  # nothing left anywhere: any move will do
             legal = int(self._chart.legal[cell[0] * cols + cell[1]])
             move = (legal & -legal).bit_length() - 1
@@ -392,6 +401,11 @@ def nearest_labels(labels: NDArray[np.integer[Any]]) -> NDArray[np.int32]:
     return np.ascontiguousarray(labels[tuple(nearest)].ravel(), dtype=np.int32)
 
 
-def homes(labels: NDArray[np.int32], blocks: tuple[int, int]) -> NDArray[np.int32]:
-    """The label that all cells of a block have, -1 where they differ: int [blocks]."""
-    raise NotImplementedError
+def homes(labels: NDArray[np.int32], shape: tuple[int, int]) -> NDArray[np.int32]:
+    """The label that all cells of a block have, -1 where they differ: int [blocks], row by row."""
+    rows, cols = shape
+    size = charts.BLOCK
+    full = np.pad(labels.reshape(shape), ((0, -rows % size), (0, -cols % size)), mode="edge")
+    tiles = full.reshape(full.shape[0] // size, size, full.shape[1] // size, size)
+    least, most = tiles.min(axis=(1, 3)), tiles.max(axis=(1, 3))
+    return np.ascontiguousarray(np.where(least == most, least, -1).ravel(), dtype=np.int32)

@@ -38,7 +38,7 @@ class SweepSettings:
     """
 
     iterations: int | None = 4
-    horizon: int = 4000
+    horizon: int = 2500
     explore: float = 1.0
     keep: float = 0.75
     spread: float = 0.02

@@ -36,6 +36,7 @@ from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
 log = logging.getLogger("roisearch")
 LatLon = tuple[float, float]
 TICK_S = 0.1
+LEAST_PATIENCE_WALL_S = 1.5
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 
 
@@ -152,6 +153,10 @@ class Mission:
             await self.happen(Event.ABORT, "the operator asked")
         return self.state.value
 
+    def flight_time(self) -> float:
+        """Seconds in the air so far."""
+        return (self.flight.ended or self.clock.now()) - self.flight.began if self.flight.began else 0.0
+
     # ---- phases ------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
@@ -201,6 +206,8 @@ class Mission:
             await self.happen(Event.RETURN, "found: flying home")
         elif self.state == State.RETURNING:
             await self._go_home()
+        elif self.state == State.HOLDING:
+            await self._wait_out_the_hold()
         else:
             await self._changed.wait()
 
@@ -234,8 +241,6 @@ class Mission:
             await self.happen(Event.SUSPECT, f"a place with probability {place.probability:.0%}")
         elif place.probability < CLEARED_BELOW:
             await self.happen(Event.CLEARED, "nothing there")
-        battery = self.vehicle.telemetry.battery_percent
-        flown = self.clock.now() - self.flight.began
         enough = settings.search.stop_at_pos * self.search.grid.reachable_mass
         if self.search.record.searched >= enough and self.state == State.SEARCHING:
             self.why_stopped = f"searched to POS {self.search.record.searched:.1%}"
@@ -243,15 +248,35 @@ class Mission:
         elif self.flight.steps >= settings.search.max_steps:
             self.why_stopped = f"{self.flight.steps} steps flown"
             await self._stop_searching(Event.SEARCHED)
-        elif battery is not None and battery <= settings.flight.min_battery_percent:
-            self.why_stopped = f"battery at {battery:.0f} %"
+        elif why := self._energy_low():
+            self.why_stopped = why
             await self._stop_searching(Event.ENERGY_LOW)
-        elif flown >= settings.flight.max_flight_s:
-            self.why_stopped = f"{flown:.0f} s in the air"
-            await self._stop_searching(Event.ENERGY_LOW)
-        elif self.clock.now() - self.intake.last_at > settings.sensor.silent_after_s:
+        elif self._detector_silent():
             log.warning("no detector report for %.0f s: hovering", settings.sensor.silent_after_s)
             await self.hold("detector", "the detector is silent")
+
+    async def _wait_out_the_hold(self) -> None:
+        """Hover until the cause is gone, an operator decides, or the energy is needed for the way home."""
+        while self.state == State.HOLDING:
+            if "detector" in self._holds and not self._detector_silent():
+                await self.release("detector", "the detector reports again")
+            elif why := self._energy_low():
+                self.why_stopped = why
+                await self._stop_searching(Event.ENERGY_LOW)
+            await self._tick()
+
+    def _detector_silent(self) -> bool:
+        """No report for too long; never shorter than what a busy host may need in wall time."""
+        limit = max(self.settings.sensor.silent_after_s, LEAST_PATIENCE_WALL_S * self.clock.speedup)
+        return self.clock.now() - self.intake.last_at > limit
+
+    def _energy_low(self) -> str:
+        """Why the aircraft must fly home now, or nothing."""
+        battery = self.vehicle.telemetry.battery_percent
+        flown = self.flight_time()
+        if battery is not None and battery <= self.settings.flight.min_battery_percent:
+            return f"battery at {battery:.0f} %"
+        return f"{flown:.0f} s in the air" if flown >= self.settings.flight.max_flight_s else ""
 
     async def _stop_searching(self, event: Event) -> None:
         self.searched = True
@@ -286,8 +311,6 @@ class Mission:
 
     def observed(self, observation: Observation, arrived: float) -> None:
         """An observation was applied (called by the intake): a hit asks for a new decision at once."""
-        if self.state == State.HOLDING and "detector" in self._holds:
-            self._group.create_task(self.release("detector", "the detector reports again"))
         if not observation.hits.any():
             return
         for lat, lon in self.frame.to_latlon(observation.cells[observation.hits]):

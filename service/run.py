@@ -278,7 +278,7 @@ class Service:
                 telemetry.heading_deg,
                 telemetry.position_time,
             )
-        flown = self.clock.now() - mission.flight.began if mission and mission.flight.began else 0.0
+        flown = mission.flight_time() if mission else 0.0
         return {
             "state": mission.state if mission else State.WAITING,
             "area": self.area.name,
@@ -382,7 +382,7 @@ class Service:
         if mission.state == State.DONE and not found and not mission.searched:
             outcome = "aborted"
         place = self.search.place
-        flown = (flight.ended or self.clock.now()) - flight.began if flight.began else 0.0
+        flown = mission.flight_time()
         report: dict[str, Any] = {
             "outcome": outcome,
             "position": {"lat": found.lat, "lon": found.lon} if found else None,

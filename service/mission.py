@@ -90,8 +90,9 @@ class Mission:
         self.why_stopped = ""
         self.searched = False  # the search ended because there was nothing more to gain, not by an order
         self._holds: set[str] = set()
+        flight = settings.flight
         self._navigator = Navigator(
-            self.frame.cell_m, settings.flight.deceleration_mps2, settings.flight.corner_m
+            self.frame.cell_m, flight.speed_mps, flight.deceleration_mps2, flight.corner_m
         )
         self._thinking: asyncio.Task[Decision] | None = None
         self._hit_at: float | None = None
@@ -297,7 +298,7 @@ class Mission:
             navigator.decide(decision.path)
             await self._decided(decision)
         thinking_s = self.settings.search.deadline_s * self.clock.speedup
-        if self._thinking is None and navigator.wants_decision(remaining, speed, thinking_s):
+        if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
             self._thinking = asyncio.create_task(
                 self.search.decide(navigator.waypoint, navigator.heading, self._unseen(navigator.ahead))
             )

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roisearch.kernels.looks import (
     BAD_PROBABILITY,
-    IMPOSSIBLE,
+    CERTAIN,
+    OK,
     OUT_OF_MAP,
     apply_looks,
     sum_up,
@@ -29,14 +30,18 @@ _TINY, _HUGE = 2.0**-500, 2.0**500
 class Belief:
     """The probability of each cell, and of 'not in the area at all'.
 
-    A look multiplies the odds of the looked-at cell by p_tp / (1 - p_tn) on a hit and by (1 - p_tp) / p_tn on a
-    miss (Bayes' rule for one static target, the paper's section 'Belief Update'), and of nothing else. So
-    the weights are kept unnormalised beside their total, and an observation of k cells costs O(k log cells).
+    A look multiplies the odds of the looked-at cell by p_tp / (1 - p_tn) on a hit and by (1 - p_tp) / p_tn
+    on a miss (Bayes' rule for one static target, the paper's section 'Belief Update'), and of nothing else.
+    So the weights are kept unnormalised beside their total, and an observation of k cells costs O(k log
+    cells).
 
     Args:
         prior: float [rows, cols], finite, not negative; scaled so that the cells hold 1 - outside together.
         searchable: bool [rows, cols]; where False, the target cannot be and the prior counts as zero.
         outside: probability that the target is not in the area, 0 <= outside < 1.
+
+    Attributes:
+        hits: how many hits it has taken in; planners compare it to know that the picture has changed.
 
     Raises:
         ValueError: when the prior is not such an array, or holds no mass where the target can be.
@@ -72,6 +77,7 @@ class Belief:
         self._sums = np.empty(int(self._offsets[-1]))
         sum_up(weights, self._sums, self._offsets)
         self._forests: list[ForestSums] = []
+        self.hits = 0
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -129,42 +135,56 @@ class Belief:
                 explain the observation. The belief is then as it was.
         """
         at = np.ascontiguousarray(cells, dtype=np.int64)
+        if at.size == 0:
+            return
         if at.ndim != 2 or at.shape[1] != 2:
-            if at.size == 0:
-                return
             raise ValueError(f"cells must be rows and columns, [k, 2], not of shape {at.shape}")
         k = at.shape[0]
-        hit = _per_look(hits, k, "hits", np.bool_)
-        tp = _per_look(p_tp, k, "p_tp", np.float64)
-        tn = _per_look(p_tn, k, "p_tn", np.float64)
-        if (tn[hit] >= 1.0).any():
-            self._observe_certain(at, hit, tp, tn)
-            return
-        status, look = apply_looks(
+        hit = _flags(hits, k)
+        tp = _numbers(p_tp, k, "p_tp")
+        tn = _numbers(p_tn, k, "p_tn")
+        status, number = apply_looks(
             self._weights, self._sums, self._offsets, self._outside, self._shape[1], at, hit, tp, tn
         )
-        if status == OUT_OF_MAP:
-            rows, cols = self._shape
-            raise ValueError(
-                f"the cell ({at[look, 0]}, {at[look, 1]}) is outside the map of {rows} x {cols} cells"
-            )
-        if status == BAD_PROBABILITY:
-            raise ValueError(
-                f"p_tp must be from 0 to 1 and p_tn above 0 up to 1, not {tp[look]} and {tn[look]}"
-            )
-        if status == IMPOSSIBLE:
-            raise ValueError("no target anywhere could explain this observation")
-        for forest in self._forests:
-            forest.touch(at, self._weights)
-        if not _TINY < self.total < _HUGE:
+        if status != OK:
+            self._explain(status, number, at, hit, tp, tn)
+            return
+        self.hits += number
+        for kept in self._forests:
+            kept.touch(at, self._weights)
+        if not _TINY < self._sums[-1] + self._outside < _HUGE:
             self._rescale()
 
-    def _observe_certain(
+    def _explain(
         self,
+        status: int,
+        look: int,
         cells: NDArray[np.int64],
         hits: NDArray[np.bool_],
         p_tp: NDArray[np.float64],
         p_tn: NDArray[np.float64],
+    ) -> None:
+        """Raise for an observation that cannot be; a certain one is taken in another way."""
+        if status == CERTAIN:
+            self._observe_certain(
+                cells, *(np.broadcast_to(array, len(cells)) for array in (hits, p_tp, p_tn))
+            )
+        elif status == OUT_OF_MAP:
+            rows, cols = self._shape
+            where = f"({cells[look, 0]}, {cells[look, 1]})"
+            raise ValueError(f"the cell {where} is outside the map of {rows} x {cols} cells")
+        elif status == BAD_PROBABILITY:
+            tp, tn = p_tp[look % p_tp.size], p_tn[look % p_tn.size]
+            raise ValueError(f"p_tp must be from 0 to 1 and p_tn above 0 up to 1, not {tp} and {tn}")
+        else:
+            raise ValueError("no target anywhere could explain this observation")
+
+    def _observe_certain(
+        self,
+        cells: NDArray[np.int64],
+        hits: NDArray[Any],
+        p_tp: NDArray[Any],
+        p_tn: NDArray[Any],
     ) -> None:
         """A hit of a detector without false alarms: the target is in that cell, so it is nowhere else."""
         sure = hits & (p_tn >= 1.0)
@@ -176,6 +196,7 @@ class Belief:
         self._weights[:] = 0.0
         self._weights[int(there[0, 0]) * self._shape[1] + int(there[0, 1])] = 1.0
         self._outside = 0.0
+        self.hits = after.hits
         self._renew()
 
     def _rescale(self) -> None:
@@ -208,6 +229,7 @@ class Belief:
         twin._offsets = self._offsets
         twin._sums = self._sums.copy()
         twin._forests = [kept.copy() for kept in self._forests]
+        twin.hits = self.hits
         return twin
 
     def to_bytes(self) -> bytes:
@@ -238,16 +260,31 @@ class Belief:
         return hashlib.sha256(self.to_bytes()).hexdigest()
 
 
-_CONSTANTS: dict[tuple[float, int], NDArray[np.float64]] = {}
+_YES_NO = (np.zeros(1, dtype=np.bool_), np.ones(1, dtype=np.bool_))
+_KNOWN: dict[float, NDArray[np.float64]] = {}
 
 
-def _per_look(
-    value: ArrayLike, k: int, name: str, kind: type[np.bool_] | type[np.float64]
-) -> NDArray[np.bool_] | NDArray[np.float64]:
-    """`value` as an array with one entry a look."""
-    array = np.ascontiguousarray(value, dtype=kind)
-    if array.shape == (k,):
-        return array
-    if array.size == 1:
-        return np.full(k, array.reshape(-1)[0], dtype=kind)
-    raise ValueError(f"{name} must be one value or one for each of the {k} cells, not of shape {array.shape}")
+def _flags(value: ArrayLike, k: int) -> NDArray[np.bool_]:
+    """`value` as bool [k], or [1] for all looks alike."""
+    if isinstance(value, bool):
+        return _YES_NO[value]
+    array = np.ascontiguousarray(value, dtype=np.bool_)
+    if array.shape not in ((k,), (1,)):
+        raise ValueError(f"hits must be one for each of the {k} cells, not of shape {array.shape}")
+    return array
+
+
+def _numbers(value: ArrayLike, k: int, name: str) -> NDArray[np.float64]:
+    """`value` as float [k], or [1] for all looks alike; a plain number is converted once and remembered."""
+    if isinstance(value, float):
+        if value not in _KNOWN:
+            if len(_KNOWN) >= 256:
+                _KNOWN.clear()
+            _KNOWN[value] = np.array([value])
+        return _KNOWN[value]
+    array = np.ascontiguousarray(value, dtype=np.float64)
+    if array.shape not in ((k,), (1,)):
+        raise ValueError(
+            f"{name} must be one number or one for each of the {k} cells, not of shape {array.shape}"
+        )
+    return array

@@ -76,7 +76,7 @@ class Decision:
 
 
 def action_name(action: int) -> str:
-    """The name of an action by its number: 0-3 the moves, 4 the ground outside all regions, 4 + k region k."""
+    """The name of an action: 0-3 the moves, 4 the ground outside all regions, 4 + k region k."""
     if action < 4:
         return HEADINGS[action]
     return "elsewhere" if action == 4 else f"region {action - 4}"

@@ -10,14 +10,14 @@ from roisearch.kernels.looks import FANOUT
 
 
 class Forest:
-    """For each region 0 .. regions - 1 a tree over its cells. Immutable; what the arrays mean: `kernels.forest`.
+    """For each region 0 .. regions - 1 a tree over its cells, immutable; its arrays: see `kernels.forest`.
 
     Args:
         labels: int [rows, cols], the region of each cell, negative for none.
         regions: how many regions; one without cells is allowed.
     """
 
-    def __init__(self, labels: NDArray[np.int64], regions: int) -> None:
+    def __init__(self, labels: NDArray[np.integer], regions: int) -> None:
         self.shape: tuple[int, int] = (labels.shape[0], labels.shape[1])
         flat = labels.ravel()
         cells = np.flatnonzero(flat >= 0)

@@ -80,7 +80,8 @@ class FieldOfView:
             array = np.asarray(DEFAULT_P if value is None else value, dtype=np.float64)
             if array.shape not in ((), drawn.shape):
                 raise ValueError(f"{name} is one number or one for each cell of the mask {drawn.shape}")
-            return np.broadcast_to(array, drawn.shape)[drawn]
+            cells: NDArray[np.float64] = np.broadcast_to(array, drawn.shape)[drawn]
+            return cells
 
         return cls._from_north("mask", seen - middle, per_cell(p_tp, "p_tp"), per_cell(p_tn, "p_tn"))
 

@@ -16,10 +16,12 @@ class Part:
     """One connected part of the flyable ground.
 
     Attributes:
+        label: its number, from 1.
         legal: uint8 [cells], bit h set when move h stays on this part; 0 off it.
         viewable: bool [rows, cols], what can be looked at from it.
     """
 
+    label: int
     legal: NDArray[np.uint8]
     viewable: NDArray[np.bool_]
 
@@ -81,7 +83,7 @@ class Ground:
             for i, (row, col) in enumerate(self.fov.offsets[heading]):
                 if self.fov.p_tp[i] > 0.0:
                     viewable |= shifted(arriving, int(row), int(col))
-        return Part(np.ascontiguousarray(legal.ravel()), viewable)
+        return Part(label, np.ascontiguousarray(legal.ravel()), viewable)
 
 
 def shifted(mask: NDArray[np.bool_], rows: int, cols: int) -> NDArray[np.bool_]:

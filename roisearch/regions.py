@@ -58,7 +58,7 @@ def segment_regions(
     top = ndimage.maximum_filter(mass, size=5)
     seeds = inside & (mass >= top * (1.0 - 1e-9))
     markers, count = ndimage.label(seeds, structure=np.ones((3, 3)))
-    labels = watershed(-mass, markers, mask=inside).astype(np.int32)
+    labels = watershed(-mass, markers, mask=inside).astype(np.int32)  # type: ignore[no-untyped-call]
     numbers = np.arange(1, count + 1)
     centroids = np.array(ndimage.center_of_mass(np.ones_like(mass), labels, numbers)).reshape(-1, 2)
     peaks = np.array(ndimage.maximum_position(mass, labels, numbers), dtype=np.int64).reshape(-1, 2)

@@ -5,29 +5,28 @@ box on the map: the same tree answers 'how much mass is in region 3', 'where is 
 by branch and bound, 'which cell has the most mass for its distance'. Like the belief's total, every number is
 recomputed from the weights and never adjusted, so it cannot drift.
 
-Arrays (see `roisearch.forest.Forest`): `cell_of` [slots] the cell in a slot, -1 for padding; `slot_of` [cells]
-its inverse, -1 for a cell in no region; nodes 0 .. slots / 16 - 1 are the leaves, node j over slots 16 j ..
-16 j + 15; `first`, `last` [nodes] the children of an inner node; `parent` [nodes], -1 for a root; `box`
-[nodes, 4] the rows and columns covered, inclusive: row_min, row_max, col_min, col_max; `root` [regions].
+Arrays (see `roisearch.forest.Forest`): `cell_of` [slots] the cell in a slot, -1 for padding; `slot_of`
+[cells] its inverse, -1 for a cell in no region; nodes 0 .. slots / 16 - 1 are the leaves, node j over slots
+16 j .. 16 j + 15; `first`, `last` [nodes] the children of an inner node; `parent` [nodes], -1 for a root;
+`box` [nodes, 4] the rows and columns covered, inclusive: row_min, row_max, col_min, col_max; `root`
+[regions].
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from roisearch.kernels.compiled import kernel
+from roisearch.kernels.records import Floats, Forest, Ints
 
 
 @kernel
 def _renew(
     node: int,
-    weights: NDArray[np.float64],
-    cell_of: NDArray[np.int64],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    sums: NDArray[np.float64],
-    peaks: NDArray[np.float64],
+    weights: Floats,
+    cell_of: Ints,
+    first: Ints,
+    last: Ints,
+    sums: Floats,
+    peaks: Floats,
 ) -> None:
     """Recompute one node from its children."""
     total = 0.0
@@ -49,12 +48,12 @@ def _renew(
 
 @kernel
 def grow(
-    weights: NDArray[np.float64],
-    cell_of: NDArray[np.int64],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    sums: NDArray[np.float64],
-    peaks: NDArray[np.float64],
+    weights: Floats,
+    cell_of: Ints,
+    first: Ints,
+    last: Ints,
+    sums: Floats,
+    peaks: Floats,
 ) -> None:
     """Fill `sums` and `peaks` [nodes] of the whole forest."""
     for node in range(first.size):
@@ -63,16 +62,16 @@ def grow(
 
 @kernel
 def touch(
-    cells: NDArray[np.int64],
+    cells: Ints,
     cols: int,
-    weights: NDArray[np.float64],
-    cell_of: NDArray[np.int64],
-    slot_of: NDArray[np.int64],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    parent: NDArray[np.int64],
-    sums: NDArray[np.float64],
-    peaks: NDArray[np.float64],
+    weights: Floats,
+    cell_of: Ints,
+    slot_of: Ints,
+    first: Ints,
+    last: Ints,
+    parent: Ints,
+    sums: Floats,
+    peaks: Floats,
 ) -> None:
     """Renew the nodes above the changed `cells` [k, 2]."""
     for look in range(cells.shape[0]):
@@ -86,24 +85,24 @@ def touch(
 
 
 @kernel
-def peak_cell(
-    root: int,
-    weights: NDArray[np.float64],
-    cell_of: NDArray[np.int64],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    peaks: NDArray[np.float64],
-) -> int:
+def peak_cell(root: int, weights: Floats, forest: Forest) -> int:
     """The most probable cell below `root`, the first in slot order among equals; -1 when all is zero."""
-    if peaks[root] <= 0.0:
+    peak = forest.peaks[root]
+    if peak <= 0.0:
         return -1
     node = root
-    while node * 16 >= cell_of.size:
-        for child in range(first[node], last[node]):
-            if peaks[child] == peaks[node]:
+    while node * 16 >= forest.cell_of.size:
+        for child in range(forest.first[node], forest.last[node]):
+            if forest.peaks[child] == peak:
                 node = child
                 break
     for slot in range(node * 16, node * 16 + 16):
-        if weights[cell_of[slot]] == peaks[node]:
-            return int(cell_of[slot])
+        if weights[forest.cell_of[slot]] == peak:
+            return int(forest.cell_of[slot])
     return -1
+
+
+@kernel
+def find_peak(root: int, weights: Floats, cell_of: Ints, first: Ints, last: Ints, peaks: Floats) -> int:
+    """`peak_cell` to be called from Python."""
+    return peak_cell(root, weights, Forest(cell_of, first, last, last.reshape(-1, 1), peaks))

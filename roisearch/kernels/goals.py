@@ -2,45 +2,51 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from roisearch.kernels.compiled import kernel
 from roisearch.kernels.forest import peak_cell
-from roisearch.kernels.ground import FAR, find_sources, steps_to
+from roisearch.kernels.ground import find_sources, flood, open_steps
+from roisearch.kernels.records import FAR, PEAK_GOAL, Aims, Floats, Forest, Ints, Land, Sight, Steps
 
-PEAK, INDEX = 0, 1
+
+@kernel
+def steps_from(row: int, col: int, goal: int, land: Land, sight: Sight, forward: Steps, sources: Ints) -> int:
+    """Steps from (row, col) until `goal` has been looked at; `forward` [cells] as in `index_cell`."""
+    count = 0
+    if forward.size > 0 or not sight.is_point:
+        count = find_sources(goal, land, sight, sources)
+    if forward.size == 0:
+        return open_steps(row, col, goal // land.cols, goal % land.cols, sources, count, sight)
+    least = FAR
+    for i in range(count):
+        least = min(least, int(forward[sources[i, 0]]) + 1)
+    return least
 
 
 @kernel
 def index_cell(
     root: int,
-    at: int,
-    weights: NDArray[np.float64],
-    cell_of: NDArray[np.int64],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    box: NDArray[np.int64],
-    peaks: NDArray[np.float64],
-    legal: NDArray[np.uint8],
-    cols: int,
-    offsets: NDArray[np.int64],
-    is_point: bool,
+    row: int,
+    col: int,
+    weights: Floats,
+    forest: Forest,
+    land: Land,
+    sight: Sight,
     reach: int,
-    worth: NDArray[np.float64],
-    forward: NDArray[np.int32],
-    stack: NDArray[np.int64],
-) -> int:
-    """The cell below `root` with the largest weight * worth[steps from `at`], by branch and bound; -1 if none.
+    worth: Floats,
+    forward: Steps,
+    sources: Ints,
+    stack: Ints,
+) -> tuple[int, float]:
+    """The cell below `root` with the largest weight * worth[steps], and that score; (-1, 0) without any.
 
-    `worth` [steps] falls with the number of steps; steps ** (-1 / alpha) makes it the argmax of m ** alpha /
-    steps. A node is skipped when even its peak, as near as its box and the sensor's reach allow, is no better
-    than the best cell so far. `forward` [cells], steps from `at` around obstacles, is empty on open ground.
+    `worth` [steps] falls with the steps; steps ** (-1 / alpha) makes this the argmax of m ** alpha / steps.
+    Branch and bound: a node is skipped when even its peak, as near as its box and the sensor's `reach` allow,
+    is no better than the best cell so far. `forward` [cells], the steps from (row, col) around obstacles, is
+    empty on open ground.
     """
     best, best_cell = 0.0, -1
-    sources = np.empty(4 * offsets.shape[1], dtype=np.int64)
-    no_fields = np.empty((0, 0), dtype=np.int32)
-    row, col = at // cols, at % cols
+    far = worth.size - 1
+    box = forest.box
     top = 0
     stack[0] = root
     while top >= 0:
@@ -49,73 +55,75 @@ def index_cell(
         apart = max(box[node, 0] - row, 0, row - box[node, 1]) + max(
             box[node, 2] - col, 0, col - box[node, 3]
         )
-        if peaks[node] * worth[min(max(apart - reach, 1), worth.size - 1)] <= best:
+        if forest.peaks[node] * worth[min(max(apart - reach, 1), far)] <= best:
             continue
-        if node * 16 >= cell_of.size:
-            for child in range(last[node] - 1, first[node] - 1, -1):
+        if node * 16 >= forest.cell_of.size:
+            for child in range(forest.last[node] - 1, forest.first[node] - 1, -1):
                 top += 1
                 stack[top] = child
             continue
         for slot in range(node * 16, node * 16 + 16):
-            cell = cell_of[slot]
+            cell = forest.cell_of[slot]
             if cell < 0:
                 break
-            apart = max(abs(cell // cols - row) + abs(cell % cols - col) - reach, 1)
-            if weights[cell] * worth[min(apart, worth.size - 1)] <= best:
+            apart = max(abs(cell // land.cols - row) + abs(cell % land.cols - col) - reach, 1)
+            if weights[cell] * worth[min(apart, far)] <= best:
                 continue
-            steps = FAR
-            if is_point and forward.size == 0:
-                steps = steps_to(at, cell, 0, cols, True, sources, 0, no_fields)
-            else:
-                count = find_sources(cell, legal, cols, offsets, sources)
-                if forward.size == 0:
-                    steps = steps_to(at, cell, 0, cols, False, sources, count, no_fields)
-                else:
-                    for i in range(count):
-                        steps = min(steps, forward[sources[i]] + 1)
-            if steps >= FAR:
-                continue
-            score = weights[cell] * worth[min(steps, worth.size - 1)]
+            steps = steps_from(row, col, cell, land, sight, forward, sources)
+            score = weights[cell] * worth[min(steps, far)] if steps < FAR else 0.0
             if score > best:
                 best, best_cell = score, cell
-    return best_cell
+    return best_cell, best
 
 
 @kernel
-def choose_goals(
+def set_goals(
     rule: int,
-    at: int,
-    roots: NDArray[np.int64],
-    goals: NDArray[np.int64],
-    sources: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    weights: NDArray[np.float64],
-    cell_of: NDArray[np.int64],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    box: NDArray[np.int64],
-    peaks: NDArray[np.float64],
-    legal: NDArray[np.uint8],
-    cols: int,
-    offsets: NDArray[np.int64],
-    is_point: bool,
+    row: int,
+    col: int,
+    roots: Ints,
+    weights: Floats,
+    forest: Forest,
+    land: Land,
+    sight: Sight,
     reach: int,
-    worth: NDArray[np.float64],
-    forward: NDArray[np.int32],
-    stack: NDArray[np.int64],
+    worth: Floats,
+    forward: Steps,
+    queue: Ints,
+    field_goals: Ints,
+    stack: Ints,
+    aims: Aims,
 ) -> None:
-    """Fill `goals` [regions] (-1: nothing to find there), and their `sources` [regions, 4 k] and `counts`."""
+    """Fill `aims`: each region's goal (-1: nothing to find), its sources, the way around obstacles.
+
+    `field_goals` [regions] tells which goals the fields were made for: an unchanged goal keeps its field.
+    """
+    if forward.size > 0 and rule != PEAK_GOAL:
+        stack[0] = row * land.cols + col
+        flood(stack[:1], 0, land.legal, land.cols, forward, queue)
     for region in range(roots.size):
         goal = -1
         if roots[region] >= 0:
-            if rule == PEAK:
-                goal = peak_cell(roots[region], weights, cell_of, first, last, peaks)
+            if rule == PEAK_GOAL:
+                goal = peak_cell(roots[region], weights, forest)
             else:
-                goal = index_cell(
-                    roots[region], at, weights, cell_of, first, last, box, peaks, legal, cols, offsets, is_point,
-                    reach, worth, forward, stack,
+                goal, _ = index_cell(
+                    roots[region], row, col, weights, forest, land, sight, reach, worth, forward,
+                    aims.sources[region], stack,
                 )  # fmt: skip
-        goals[region] = goal
-        counts[region] = 0
-        if goal >= 0:
-            counts[region] = find_sources(goal, legal, cols, offsets, sources[region])
+        aims.goals[region, 0] = goal
+        if goal < 0:
+            continue
+        aims.goals[region, 1] = goal // land.cols
+        aims.goals[region, 2] = goal % land.cols
+        aims.counts[region] = find_sources(goal, land, sight, aims.sources[region])
+        if aims.fields.shape[0] > 0 and goal != field_goals[region]:
+            flood(
+                aims.sources[region, : aims.counts[region], 0],
+                1,
+                land.legal,
+                land.cols,
+                aims.fields[region],
+                queue,
+            )
+            field_goals[region] = goal

@@ -13,15 +13,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import allocating_kernel, kernel
 
 FANOUT = 16
 
-OK, OUT_OF_MAP, BAD_PROBABILITY, IMPOSSIBLE = 0, 1, 2, 3
+OK, OUT_OF_MAP, BAD_PROBABILITY, IMPOSSIBLE, CERTAIN = 0, 1, 2, 3, 4
 
 
 def tree_offsets(cells: int) -> NDArray[np.int64]:
-    """Where each level of the sum tree over `cells` leaves starts, and the length of all levels: int [levels + 1]."""
+    """Where each level of the sum tree over `cells` leaves starts, and where the last ends: [levels + 1]."""
     offsets = [0]
     size = cells
     while True:
@@ -62,7 +62,7 @@ def resum(
         sums[offsets[level] + node] = total
 
 
-@kernel
+@allocating_kernel
 def apply_looks(
     weights: NDArray[np.float64],
     sums: NDArray[np.float64],
@@ -74,31 +74,43 @@ def apply_looks(
     p_tp: NDArray[np.float64],
     p_tn: NDArray[np.float64],
 ) -> tuple[int, int]:
-    """Multiply the odds of each looked-at cell; (OK, 0), or why not and for which look, with nothing changed.
+    """Multiply the odds of each looked-at cell.
 
     Args:
         weights: [rows * cols], changed in place; `sums` and `offsets` as in this module's first lines.
         outside: weight of 'not in the area'; no look changes it.
-        cells: row and column, [k, 2]; hits [k]; p_tp, p_tn: [k]. All p_tn are below 1 where there is a hit.
+        cells: row and column, [k, 2].
+        hits, p_tp, p_tn: [k], or [1] for all looks alike.
+
+    Returns:
+        (OK, number of hits); or why not, the look at fault, and nothing has changed. CERTAIN is a hit with
+        p_tn = 1, whose odds are infinite.
     """
     rows = weights.size // cols
+    found = 0
     for look in range(cells.shape[0]):
         row, col = cells[look, 0], cells[look, 1]
+        tp, tn = p_tp[look % p_tp.size], p_tn[look % p_tn.size]
         if row < 0 or col < 0 or row >= rows or col >= cols:
             return OUT_OF_MAP, look
-        if not (0.0 <= p_tp[look] <= 1.0 and 0.0 < p_tn[look] <= 1.0):
+        if not (0.0 <= tp <= 1.0 and 0.0 < tn <= 1.0):
             return BAD_PROBABILITY, look
+        if hits[look % hits.size]:
+            found += 1
+            if tn == 1.0:
+                return CERTAIN, look
     before = np.empty(cells.shape[0])
     for look in range(cells.shape[0]):
         cell = cells[look, 0] * cols + cells[look, 1]
+        tp, tn = p_tp[look % p_tp.size], p_tn[look % p_tn.size]
         before[look] = weights[cell]
-        if hits[look]:
-            weights[cell] *= p_tp[look] / (1.0 - p_tn[look])
+        if hits[look % hits.size]:
+            weights[cell] *= tp / (1.0 - tn)
         else:
-            weights[cell] *= (1.0 - p_tp[look]) / p_tn[look]
+            weights[cell] *= (1.0 - tp) / tn
         resum(cell, weights, sums, offsets)
     if sums[-1] + outside > 0.0 and np.isfinite(sums[-1]):
-        return OK, 0
+        return OK, found
     for look in range(cells.shape[0] - 1, -1, -1):
         cell = cells[look, 0] * cols + cells[look, 1]
         weights[cell] = before[look]

@@ -235,7 +235,9 @@ class Vehicle:
         autopilot, t, since = self._need_autopilot(), self.telemetry, self._clock.now()
         if not 1.0 <= height_m <= self.settings.max_height_change_m:
             limit = self.settings.max_height_change_m
-            raise NotPermitted(f"no take-off to {height_m} m: between 1 and {limit:g} m above home is possible")
+            raise NotPermitted(
+                f"no take-off to {height_m} m: between 1 and {limit:g} m above home is possible"
+            )
         if not t.armed or t.landed_state != "on_ground":
             state = "armed" if t.armed else "not armed"
             raise NotPermitted(f"no take-off: the vehicle is {state} and says {t.landed_state!r}")

@@ -3,5 +3,5 @@
 from __future__ import annotations
 
 
-class BadInput(ValueError):
+class BadInput(ValueError):  # noqa: N818
     """What a person gave cannot be used; the message is one sentence: what, where, what would be right."""

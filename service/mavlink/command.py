@@ -1,11 +1,11 @@
 """Commands as values, and the book that sends, repeats and ends them.
 
-MAVLink's command protocol matches an answer to a command by the command's number only, so at most one command of
-each number is on its way. A command is repeated (with a growing `confirmation`) until it is acknowledged, and given
-up after some attempts. Two habits of real autopilots shape this:
+MAVLink's command protocol matches an answer to a command by the command's number only, so at most one command
+of each number is on its way. A command is repeated (with a growing `confirmation`) until it is acknowledged,
+and given up after some attempts. Two habits of real autopilots shape this:
 
-* PX4 acknowledges DO_SET_MODE twice, and the two may disagree. A command that asks for a mode (`goal_mode`) therefore
-  ends when the heartbeat shows that mode, whatever the acknowledgements say.
+* PX4 acknowledges DO_SET_MODE twice, and the two may disagree. A command that asks for a mode (`goal_mode`)
+  therefore ends when the heartbeat shows that mode, whatever the acknowledgements say.
 * A late second acknowledgement must not answer the next command of the same number, so after a repeated or
   twice-acknowledged command its number rests for a moment.
 """
@@ -29,8 +29,8 @@ _REST_S = 0.3
 class Command:
     """One MAV_CMD with its seven parameters (COMMAND_LONG).
 
-    `motion` marks what moves the aircraft or arms it: such a command is dropped, not repeated, once the pilot has
-    taken over or our own process has stalled.
+    `motion` marks what moves the aircraft or arms it: such a command is dropped, not repeated, once the pilot
+    has taken over or our own process has stalled.
     """
 
     number: int
@@ -118,7 +118,7 @@ class CommandBook:
         self._next_ticket = 1
 
     def submit(self, command: Command, now: float) -> int:
-        """Send a command as soon as its number is free; returns the ticket that its CommandDone will carry."""
+        """Send a command as soon as its number is free; returns the ticket of its CommandDone."""
         ticket = self._next_ticket
         self._next_ticket += 1
         lane = self._lanes.setdefault(command.number, _Lane())

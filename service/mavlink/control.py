@@ -1,16 +1,17 @@
 """Whose aircraft it is: the rule that the pilot always wins, in one small place.
 
-Control is taken, never assumed: by an order to enter the guided mode (`take`). It is lost with the first mode that the
-heartbeat shows and that we did not ask for, with a disarm in or after flight, and with a reboot; only an order takes it
-again. While it is lost, nothing that moves the aircraft is sent, even if the mode happens to be the guided one.
+Control is taken, never assumed: by an order to enter the guided mode (`take`). It is lost with the first mode
+that the heartbeat shows and that we did not ask for, with a disarm in or after flight, and with a reboot;
+only an order takes it again. While it is lost, nothing that moves the aircraft is sent, even if the mode
+happens to be the guided one.
 
 A mode counts as asked for (`commanded`) when
 
 * we sent a command whose goal it is within the last few seconds (`expect`), or
 * it follows by itself from a mode that we had commanded (PX4 holds after its take-off).
 
-Any mode that is not asked for cancels what we still expected: a command of ours that the pilot has overtaken must not
-make a later change look like ours.
+Any mode that is not asked for cancels what we still expected: a command of ours that the pilot has overtaken
+must not make a later change look like ours.
 """
 
 from __future__ import annotations

@@ -7,13 +7,13 @@ class LinkError(Exception):
     """The link or the vehicle did not do what was asked."""
 
 
-class NotPermitted(LinkError):
+class NotPermitted(LinkError):  # noqa: N818
     """Nothing was sent, because it would not be safe or is not ours to do now."""
 
 
-class CommandFailed(LinkError):
+class CommandFailed(LinkError):  # noqa: N818
     """The vehicle refused, did not answer, or answered and did something else."""
 
 
-class NoVehicle(LinkError):
+class NoVehicle(LinkError):  # noqa: N818
     """No vehicle that can be flown was heard on the link in time."""

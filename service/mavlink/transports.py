@@ -1,8 +1,8 @@
 """The wires: sockets and serial ports that never block and never keep anything for later.
 
-`receive` gives everything that is there, so that the last heartbeat is known before the next decision. `send` hands a
-frame to the kernel now or not at all: a waypoint that waited in a queue until a broken link came back would be a
-stale order. A stream that breaks is opened again by `run`, for ever; a UDP socket never breaks.
+`receive` gives everything that is there, so that the last heartbeat is known before the next decision. `send`
+hands a frame to the kernel now or not at all: a waypoint that waited in a queue until a broken link came back
+would be a stale order. A stream that breaks is opened again by `run`, for ever; a UDP socket never breaks.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Transport(ABC):
 
     @abstractmethod
     async def run(self, on_readable: Callable[[], None]) -> None:
-        """Keep the wire up until cancelled; calls `on_readable` whenever there may be something to receive."""
+        """Keep the wire up until cancelled; calls `on_readable` when there may be something to receive."""
 
     @abstractmethod
     def receive(self) -> list[Chunk]:

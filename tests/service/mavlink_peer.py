@@ -7,6 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.core import LinkCore
 from service.mavlink.events import VehicleEvent
 from service.mavlink.settings import LinkSettings
@@ -133,6 +134,12 @@ class Rig:
         self.refused: set[int] = set()
         self._reader = mavlink.MAVLink(None)
         self._steps = 0
+
+    @property
+    def autopilot(self) -> Autopilot:
+        """What the core takes the peer for."""
+        assert self.core.autopilot is not None
+        return self.core.autopilot
 
     def say(self, data: bytes, source: Any = None) -> list[VehicleEvent]:
         """Bytes from the vehicle, now."""

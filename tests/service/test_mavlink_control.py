@@ -76,7 +76,7 @@ def test_pilot_mode_change_stops_every_motion_command(flavor: str) -> None:
     rig.run(30.0)
     assert rig.motion() == []
     assert not rig.core.in_control
-    for motion in (rig.core.autopilot.return_to_launch(), rig.core.autopilot.change_speed(3.0)):  # type: ignore[union-attr]
+    for motion in (rig.autopilot.return_to_launch(), rig.autopilot.change_speed(3.0)):
         with pytest.raises(NotPermitted):
             rig.core.request(motion, rig.now)
     assert PILOT[flavor] in refused(rig)
@@ -111,11 +111,9 @@ def test_pilot_who_switches_there_and_back_between_two_decisions_is_not_missed(f
 def test_take_over_drops_the_repetitions_of_a_mode_command(flavor: str) -> None:
     """A lost acknowledgement must not make us take the mode back from the pilot a second later."""
     rig = Rig(flavor).flying()
-    autopilot = rig.core.autopilot
-    assert autopilot is not None
     rig.peer.mode = PILOT[flavor]
     rig.run(1.0)
-    rig.core.request(autopilot.set_mode(GUIDED[flavor]), rig.now, ordered=True)
+    rig.core.request(rig.autopilot.set_mode(GUIDED[flavor]), rig.now, ordered=True)
     assert len(rig.messages("COMMAND_LONG", SET_MODE)) == 1
     rig.peer.mode = "STABILIZE" if flavor == "ardupilot" else "AUTO_RTL"
     rig.say(rig.peer.heartbeat())
@@ -128,9 +126,7 @@ def test_take_over_drops_the_repetitions_of_a_mode_command(flavor: str) -> None:
 @FLAVORS
 def test_mode_we_asked_for_is_commanded_and_ends_the_repetitions(flavor: str) -> None:
     rig = Rig(flavor).flying()
-    autopilot = rig.core.autopilot
-    assert autopilot is not None
-    rig.core.request(autopilot.return_to_launch(), rig.now)
+    rig.core.request(rig.autopilot.return_to_launch(), rig.now)
     rig.peer.mode = RETURN[flavor]
     rig.run(5.0)
     (change,) = rig.of(ModeChanged)
@@ -143,9 +139,7 @@ def test_mode_we_asked_for_is_commanded_and_ends_the_repetitions(flavor: str) ->
 @FLAVORS
 def test_guided_mode_chosen_by_the_pilot_during_our_return_is_not_ours(flavor: str) -> None:
     rig = Rig(flavor).flying()
-    autopilot = rig.core.autopilot
-    assert autopilot is not None
-    rig.core.request(autopilot.return_to_launch(), rig.now)
+    rig.core.request(rig.autopilot.return_to_launch(), rig.now)
     rig.peer.mode = RETURN[flavor]
     rig.run(10.0)
     rig.peer.mode = GUIDED[flavor]
@@ -156,13 +150,11 @@ def test_guided_mode_chosen_by_the_pilot_during_our_return_is_not_ours(flavor: s
 
 def test_hold_after_our_take_off_and_after_our_landing_is_ours_on_px4() -> None:
     rig = Rig("px4", allow_arming=True).flying()
-    autopilot = rig.core.autopilot
-    assert autopilot is not None
-    rig.core.request(autopilot.take_off(20.0, GROUND), rig.now)
+    rig.core.request(rig.autopilot.take_off(20.0, GROUND), rig.now)
     for mode in ("AUTO_TAKEOFF", "AUTO_LOITER"):
         rig.peer.mode = mode
         rig.run(12.0)
-    rig.core.request(autopilot.return_to_launch(), rig.now)
+    rig.core.request(rig.autopilot.return_to_launch(), rig.now)
     rig.peer.mode = "AUTO_RTL"
     rig.run(60.0)
     rig.peer.mode, rig.peer.armed = "AUTO_LOITER", False
@@ -263,9 +255,7 @@ def test_after_our_own_pause_nothing_old_is_sent_until_the_vehicle_is_heard_agai
 
 def test_a_pause_drops_the_repetitions_of_motion_commands() -> None:
     rig = Rig().flying()
-    autopilot = rig.core.autopilot
-    assert autopilot is not None
-    rig.core.request(autopilot.return_to_launch(), rig.now)
+    rig.core.request(rig.autopilot.return_to_launch(), rig.now)
     rig.forget()
     rig.now += 5.0
     rig.run(10.0)
@@ -274,9 +264,7 @@ def test_a_pause_drops_the_repetitions_of_motion_commands() -> None:
 
 def test_arming_and_take_off_are_never_sent_unless_allowed() -> None:
     rig = Rig().flying()
-    autopilot = rig.core.autopilot
-    assert autopilot is not None
-    for command in (autopilot.arm(), autopilot.take_off(20.0, GROUND)):
+    for command in (rig.autopilot.arm(), rig.autopilot.take_off(20.0, GROUND)):
         with pytest.raises(NotPermitted, match="not allowed"):
             rig.core.request(command, rig.now, ordered=True)
     rig.run(5.0)

@@ -87,7 +87,7 @@ def test_any_bytes_never_raise(data: list[bytes]) -> None:
     paired=st.booleans(),
 )
 def test_any_content_of_a_valid_frame_never_raises(seed: int, message_id: int, paired: bool) -> None:
-    """Checksums are right, so every message is taken in; its fields are random, NaN and infinity among them."""
+    """Checksums are right, so every message is taken in; its fields are random, NaN among them."""
     rng = random.Random(seed)
     core, peer = LinkCore(LinkSettings(), speaks_first=True), Peer()
     if paired:

@@ -1,7 +1,7 @@
 """What the service has to know about an autopilot that MAVLink itself does not say.
 
-One interface, two implementations (`px4`, `ardupilot`). Where a method has a body here, both real autopilots were
-seen to behave that way.
+One interface, two implementations (`px4`, `ardupilot`). Where a method has a body here, both real autopilots
+were seen to behave that way.
 """
 
 from __future__ import annotations
@@ -95,9 +95,9 @@ class Autopilot(ABC):
     def reposition(self, target: Target, system: int, component: int) -> Message:
         """MAV_CMD_DO_REPOSITION as COMMAND_INT, frame GLOBAL with AMSL altitude, and never a mode change.
 
-        It is the one form that both understand. param2 = 0 leaves out MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: in the
-        pilot's mode, or on the way home, the aircraft then neither moves nor changes its mode. Yaw NaN turns the nose
-        to the target.
+        It is the one form that both understand. param2 = 0 leaves out MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: in
+        the pilot's mode, or on the way home, the aircraft then neither moves nor changes its mode. Yaw NaN
+        turns the nose to the target.
         """
         return mavlink.MAVLink_command_int_message(
             system,

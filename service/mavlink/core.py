@@ -130,6 +130,7 @@ class LinkCore:
         if self.paired:
             self._check_silence(now)
             self._ask_for_streams(now)
+            self._book.motion_waits = self.why_not_command(now, ordered=True) is not None
             self._done(self._book.tick(now))
             self._push_target(now)
             self._heard_texts(self._texts.tick(now), now)
@@ -243,6 +244,7 @@ class LinkCore:
         reason = self.why_not_command(now, ordered=ordered or not command.motion)
         if reason is not None:
             raise NotPermitted(f"{command.name} was not sent: {reason}")
+        self._book.motion_waits = False
         return self._book.submit(command, now)
 
     def status_text(self, text: str, severity: int) -> bool:
@@ -325,7 +327,7 @@ class LinkCore:
 
     def _mode_changed(self, autopilot: Autopilot, previous: str, now: float) -> None:
         t = self.telemetry
-        commanded = self._control.on_mode(autopilot, previous, t.mode, armed=t.armed, now=now)
+        commanded = self._control.on_mode(autopilot, previous, t, now)
         texts = [text.text for text in self.recent_texts(now - _TEXT_MEMORY_S)]
         failsafe = not commanded and autopilot.looks_like_failsafe(t.mode, t.system_status, texts)
         kind = autopilot.mode_kind(t.mode)
@@ -472,6 +474,8 @@ class LinkCore:
         assert now is not None
         if command.goal_mode is not None:
             self._control.expect(command.goal_mode, now + self.settings.mode_window_s)
+        if command.height_m is not None:
+            self._control.climb_to(command.height_m)
         if command.number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             self._control.expect_armed(True, now + self.settings.mode_window_s)
         self._send(command.message(self.telemetry.system_id, _AUTOPILOT, confirmation))

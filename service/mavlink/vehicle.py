@@ -329,8 +329,9 @@ class Vehicle:
 
     def _pump(self) -> None:
         """Take in everything that the wire has, then send what that caused."""
-        for data, source in self._transport.receive():
-            self._publish(self._core.receive_data(data, self._clock.now(), source))
+        chunks, now = self._transport.receive(), self._clock.now()
+        for data, source in chunks:  # one time for all: what waited in the buffer is as old as its oldest
+            self._publish(self._core.receive_data(data, now, source))
         self._flush()
         self._announce()
 

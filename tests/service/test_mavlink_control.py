@@ -151,8 +151,8 @@ def test_guided_mode_chosen_by_the_pilot_during_our_return_is_not_ours(flavor: s
 def test_hold_after_our_take_off_and_after_our_landing_is_ours_on_px4() -> None:
     rig = Rig("px4", allow_arming=True).flying()
     rig.core.request(rig.autopilot.take_off(20.0, GROUND), rig.now)
-    for mode in ("AUTO_TAKEOFF", "AUTO_LOITER"):
-        rig.peer.mode = mode
+    for mode, height in (("AUTO_TAKEOFF", 5.0), ("AUTO_LOITER", 19.0)):
+        rig.peer.mode, rig.peer.height = mode, height
         rig.run(12.0)
     rig.core.request(rig.autopilot.return_to_launch(), rig.now)
     rig.peer.mode = "AUTO_RTL"
@@ -161,6 +161,16 @@ def test_hold_after_our_take_off_and_after_our_landing_is_ours_on_px4() -> None:
     rig.run(2.0)
     assert [c.commanded for c in rig.of(ModeChanged)] == [True] * 4
     assert not rig.core.in_control, "a disarmed aircraft is nobody's"
+
+
+def test_hold_chosen_by_the_pilot_in_the_middle_of_our_climb_is_not_ours() -> None:
+    rig = Rig("px4", allow_arming=True).flying()
+    rig.core.request(rig.autopilot.take_off(20.0, GROUND), rig.now)
+    for mode, height in (("AUTO_TAKEOFF", 5.0), ("AUTO_LOITER", 9.0)):
+        rig.peer.mode, rig.peer.height = mode, height
+        rig.run(3.0)
+    assert [c.commanded for c in rig.of(ModeChanged)] == [True, False]
+    assert "not by us" in refused(rig)
 
 
 def test_hold_after_a_take_off_that_was_not_ours_is_not_ours() -> None:
@@ -260,6 +270,21 @@ def test_a_pause_drops_the_repetitions_of_motion_commands() -> None:
     rig.now += 5.0
     rig.run(10.0)
     assert rig.motion() == []
+
+
+@FLAVORS
+def test_motion_command_is_not_repeated_while_the_vehicle_is_not_heard(flavor: str) -> None:
+    rig = Rig(flavor, link_lost_s=60.0, command_attempts=50).flying()
+    rig.core.request(rig.autopilot.return_to_launch(), rig.now)
+    rig.beating = False
+    rig.run(3.0)
+    assert 1 <= len(rig.motion()) <= 3
+    rig.forget()
+    rig.run(20.0)
+    assert rig.motion() == []
+    rig.beating = True
+    rig.run(3.0)
+    assert len(rig.messages("COMMAND_LONG", RTL)) >= 1, "in the same mode as before, the order still stands"
 
 
 def test_arming_and_take_off_are_never_sent_unless_allowed() -> None:

@@ -86,9 +86,10 @@ class ArduCopter(Autopilot):
     def take_off(self, height_m: float, home_alt_amsl_m: float) -> Command:
         """The altitude is above home: given an AMSL one, it climbs towards that."""
         params = (0.0, 0.0, 0.0, math.nan, 0.0, 0.0, height_m)
-        return Command(mavlink.MAV_CMD_NAV_TAKEOFF, params, motion=True, label=f"{height_m:g} m")
+        number = mavlink.MAV_CMD_NAV_TAKEOFF
+        return Command(number, params, motion=True, label=f"{height_m:g} m", height_m=height_m)
 
-    def follows(self, previous: str, mode: str, *, armed: bool) -> bool:
+    def follows(self, previous: str, mode: str, *, armed: bool, climbed: bool) -> bool:
         """Nothing: it stays in GUIDED after a take-off and in RTL or LAND after a landing."""
         return False
 

@@ -63,8 +63,13 @@ class Autopilot(ABC):
         """MAV_CMD_NAV_TAKEOFF to a height above home."""
 
     @abstractmethod
-    def follows(self, previous: str, mode: str, *, armed: bool) -> bool:
-        """Whether `mode` comes by itself after `previous`, when we had commanded `previous`."""
+    def follows(self, previous: str, mode: str, *, armed: bool, climbed: bool) -> bool:
+        """Whether `mode` comes by itself after `previous`, when we had commanded `previous`.
+
+        Args:
+            armed: it is armed now.
+            climbed: it is as high as the take-off was to go.
+        """
 
     @abstractmethod
     def refuses_reposition(self, result: int) -> bool:

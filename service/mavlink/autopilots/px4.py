@@ -81,14 +81,16 @@ class PX4(Autopilot):
         """The altitude is AMSL: given 20 where the ground is at 489 m, PX4 accepts and stays down."""
         params = (math.nan, 0.0, 0.0, math.nan, math.nan, math.nan, home_alt_amsl_m + height_m)
         number = mavlink.MAV_CMD_NAV_TAKEOFF
-        return Command(number, params, motion=True, goal_mode=self.takeoff_mode, label=f"{height_m:g} m")
+        label = f"{height_m:g} m"
+        goal = self.takeoff_mode
+        return Command(number, params, motion=True, goal_mode=goal, label=label, height_m=height_m)
 
-    def follows(self, previous: str, mode: str, *, armed: bool) -> bool:
+    def follows(self, previous: str, mode: str, *, armed: bool, climbed: bool) -> bool:
         """After a take-off it holds; after a landing it goes back to Hold once it has disarmed."""
         if mode != self.guided_mode:
             return False
         if previous == self.takeoff_mode:
-            return True
+            return climbed
         return self.mode_kind(previous) in (ModeKind.RETURN, ModeKind.LAND) and not armed
 
     def refuses_reposition(self, result: int) -> bool:

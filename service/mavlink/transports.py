@@ -294,13 +294,24 @@ class TcpServerTransport(StreamTransport):
         except OSError:
             return
         client.setblocking(False)
-        busy = self._fd is not None and time.monotonic() - self._last_read < _CLIENT_SILENT_S
+        silent_s = time.monotonic() - self._last_read
+        busy = self._fd is not None and silent_s < _CLIENT_SILENT_S and not self._client_has_gone()
         if busy or self._accepted.full():
             client.close()
             return
         self._accepted.put_nowait(client)
         if self._fd is not None:
             self._broken.set()
+
+    def _client_has_gone(self) -> bool:
+        """Whether the client has closed its end, though that was not read yet."""
+        assert self._socket is not None
+        try:
+            return not self._socket.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
 
     async def _connect(self) -> int:
         client = await self._accepted.get()

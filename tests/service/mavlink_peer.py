@@ -149,7 +149,7 @@ class Rig:
 
     def collect(self) -> list[Any]:
         """What the core has sent since the last call, read by pymavlink's own parser."""
-        new = []
+        new: list[Any] = []
         for frame in self.core.data_to_send():
             new += self._reader.parse_buffer(bytearray(frame)) or []
         self.sent += new

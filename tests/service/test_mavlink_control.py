@@ -419,7 +419,7 @@ def test_hold_stops_ahead_and_not_behind(flavor: str) -> None:
     target = rig.core.hold(rig.now)
     ahead_m = (target.lat - LAT) * 111_194.93
     assert 4.0 < ahead_m < 13.0
-    assert (target.lon, target.alt_amsl_m) == (pytest.approx(LON), pytest.approx(ALT))
+    assert (target.lon, target.alt_amsl_m) == pytest.approx((LON, ALT))
     rig.peer.velocity = (0.0, 0.0, 0.0)
     rig.run(0.5)
     assert rig.core.hold(rig.now).lat == pytest.approx(LAT)

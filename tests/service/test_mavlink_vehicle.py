@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import os
 import signal
 import socket
-import subprocess
-import sys
-from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
+import time
+from collections.abc import AsyncIterator, Callable, Coroutine
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
@@ -18,42 +19,43 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.clock import Clock
 from service.errors import BadInput
 from service.mavlink import CommandFailed, LinkError, LinkSettings, NotPermitted, NoVehicle, Vehicle
-from service.mavlink.events import ModeChanged, TargetNotTaken, TargetTaken, VehicleEvent
-from service.mavlink.target import Target, distance_m
+from service.mavlink.events import (
+    LinkBack,
+    LinkLost,
+    ModeChanged,
+    Stalled,
+    Target,
+    TargetNotTaken,
+    TargetTaken,
+    VehicleEvent,
+)
+from service.mavlink.target import distance_m
+from sim.autopilot.process import AutopilotProcess
+from tests.fixtures_autopilot import StartAutopilot, flavor, start_autopilot
 
 from .mavlink_peer import GUIDED, PILOT, RETURN, Peer
+
+__all__ = ["flavor", "start_autopilot"]
 
 SPEEDUP = 20.0
 HOME = (47.0, 8.0, 489.0)
 METRE = 1.0 / 111_194.93
-FLAVORS = pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
 PILOT_MODE = {"px4": (1.0, 3.0, 0.0), "ardupilot": (1.0, 5.0, 0.0)}
 
 
+@dataclass
 class Mock:
     """A mock autopilot process with two links: ours, and one for a pilot's ground station."""
 
-    def __init__(self, flavor: str, *arguments: str) -> None:
-        command = [sys.executable, "-m", "sim", "autopilot", "--flavor", flavor, "--speedup", str(SPEEDUP)]
-        command += ["--listen", "udpin://127.0.0.1:0", "--listen", "udpin://127.0.0.1:0"]
-        command += ["--home", ",".join(map(str, HOME)), *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        assert self.process.stdout is not None
-        said = [self.process.stdout.readline() for _ in range(2)]
-        self.ports = [int(line.rsplit(":", 1)[1]) for line in said]
+    flavor: str
+    process: AutopilotProcess
 
     @property
     def url(self) -> str:
-        return f"udpout://127.0.0.1:{self.ports[0]}"
+        return self.process.urls[0].replace("udpin", "udpout")
 
     def pilot(self) -> Pilot:
-        return Pilot(self.ports[1])
-
-    def stop(self) -> None:
-        self.process.send_signal(signal.SIGTERM)
-        self.process.wait(10)
-        assert self.process.stdout is not None
-        self.process.stdout.close()
+        return Pilot(int(self.process.urls[1].rsplit(":", 1)[1]))
 
 
 class Pilot:
@@ -70,12 +72,12 @@ class Pilot:
         self.socket.send(bytes(message.pack(self.mav)))
 
 
-@pytest.fixture(params=["px4", "ardupilot"])
-def mock(request: pytest.FixtureRequest) -> Iterator[Mock]:
-    mock = Mock(request.param)
-    mock.flavor = request.param  # type: ignore[attr-defined]
-    yield mock
-    mock.stop()
+@pytest.fixture
+def mock(flavor: str, start_autopilot: StartAutopilot) -> Mock:
+    home = ("--home", ",".join(map(str, HOME)))
+    return Mock(
+        flavor, start_autopilot(flavor, listen=["udpin://127.0.0.1:0"] * 2, speedup=SPEEDUP, options=home)
+    )
 
 
 def north(metres: float) -> float:
@@ -94,11 +96,10 @@ def flight(
             events.append(event)
 
     async def main() -> None:
-        clock = Clock(SPEEDUP)
-        async with asyncio.timeout(60.0), asyncio.TaskGroup() as group:
-            async with Vehicle.open(mock.url, clock=clock, settings=LinkSettings(**settings)) as vehicle:
-                group.create_task(record(vehicle))
-                await body(vehicle, events)
+        link = Vehicle.open(mock.url, clock=Clock(SPEEDUP), settings=LinkSettings(**settings))
+        async with asyncio.timeout(60.0), asyncio.TaskGroup() as group, link as vehicle:
+            group.create_task(record(vehicle))
+            await body(vehicle, events)
 
     asyncio.run(main())
     return events
@@ -124,7 +125,7 @@ async def arrive(vehicle: Vehicle, lat: float, lon: float, within_m: float, time
 
 
 def test_a_whole_flight(mock: Mock) -> None:
-    flavor: str = mock.flavor  # type: ignore[attr-defined]
+    flavor = mock.flavor
 
     async def fly(vehicle: Vehicle, events: list[VehicleEvent]) -> None:
         await up(vehicle)
@@ -160,7 +161,7 @@ def test_a_whole_flight(mock: Mock) -> None:
 
 
 def test_pilot_takes_over_in_flight_and_nothing_moves_the_aircraft_until_an_order(mock: Mock) -> None:
-    flavor: str = mock.flavor  # type: ignore[attr-defined]
+    flavor = mock.flavor
 
     async def fly(vehicle: Vehicle, events: list[VehicleEvent]) -> None:
         await up(vehicle)
@@ -190,6 +191,47 @@ def test_pilot_takes_over_in_flight_and_nothing_moves_the_aircraft_until_an_orde
     modes = [(e.mode, e.commanded) for e in events if isinstance(e, ModeChanged)]
     assert (PILOT[flavor], False) in modes
     assert modes[-1] == (GUIDED[flavor], True)
+
+
+def test_frozen_vehicle_is_a_lost_link_and_control_is_still_ours_when_it_comes_back(mock: Mock) -> None:
+    async def fly(vehicle: Vehicle, events: list[VehicleEvent]) -> None:
+        await up(vehicle)
+        os.kill(mock.process.pid, signal.SIGSTOP)
+        try:
+            assert await vehicle.wait_until(lambda t: t.link_lost, 200.0)
+            with pytest.raises(NotPermitted, match="not been heard"):
+                vehicle.reposition(north(20.0), HOME[1], HOME[2] + 20.0)
+            with pytest.raises(NotPermitted, match="not been heard"):
+                await vehicle.return_to_launch(ordered=True)
+        finally:
+            os.kill(mock.process.pid, signal.SIGCONT)
+        assert await vehicle.wait_until(lambda t: not t.link_lost, 100.0)
+        assert await vehicle.wait_until(lambda t: vehicle.why_not_reposition() is None, 100.0)
+        vehicle.reposition(north(20.0), HOME[1], HOME[2] + 20.0)
+        await arrive(vehicle, north(20.0), HOME[1], 3.0)
+
+    events = flight(mock, fly)
+    kinds = [type(e) for e in events]
+    assert kinds.index(LinkLost) < kinds.index(LinkBack)
+
+
+def test_pilot_who_takes_over_while_our_process_stands_still_is_not_overruled(mock: Mock) -> None:
+    async def fly(vehicle: Vehicle, events: list[VehicleEvent]) -> None:
+        await up(vehicle)
+        mock.pilot().set_mode(mock.flavor, vehicle.telemetry.system_id)
+        time.sleep(1.5)  # noqa: ASYNC251 - the event loop is meant to stand still
+        with pytest.raises(NotPermitted):
+            vehicle.reposition(north(20.0), HOME[1], HOME[2] + 20.0)
+        assert await vehicle.wait_until(lambda t: t.mode == PILOT[mock.flavor], 60.0)
+        await asyncio.sleep(0.5)
+        with pytest.raises(NotPermitted, match="not by us"):
+            vehicle.reposition(north(20.0), HOME[1], HOME[2] + 20.0)
+
+    events = flight(mock, fly)
+    assert any(isinstance(e, Stalled) for e in events)
+    assert (PILOT[mock.flavor], False) in [
+        (e.mode, e.commanded) for e in events if isinstance(e, ModeChanged)
+    ]
 
 
 def test_take_off_needs_permission_arming_and_a_sane_height(mock: Mock) -> None:

@@ -202,7 +202,8 @@ class LinkCore:
     def release_control(self, reason: str, now: float) -> None:
         """Give control up: nothing that moves the aircraft is sent any more, nor repeated."""
         self._wake(now)
-        self._drop_control(reason, now)
+        self._control.lose(reason)
+        self._stand_down(reason, now)
 
     def reposition(self, lat: float, lon: float, alt_amsl_m: float, now: float) -> Target:
         """Send the aircraft to a place; the next one replaces it.
@@ -321,7 +322,7 @@ class LinkCore:
         if after.armed != before.armed:
             commanded = self._control.on_armed(after.armed, now)
             if not after.armed:
-                self._drop_control(self._control.reason, now)
+                self._stand_down("the aircraft has disarmed", now)
             self._events.append(ArmedChanged(now, after.armed, commanded))
         self._show_control()
 
@@ -333,7 +334,7 @@ class LinkCore:
         kind = autopilot.mode_kind(t.mode)
         self._events.append(ModeChanged(now, t.mode, previous, kind, t.guided, commanded, failsafe))
         if not commanded:
-            self._drop_control(f"the mode was changed to {t.mode} and not by us", now)
+            self._stand_down(f"the mode was changed to {t.mode} and not by us", now)
         elif not t.guided:
             self._watch.clear()
 
@@ -386,7 +387,8 @@ class LinkCore:
                 self._readiness.on_complaint(now)
 
     def _rebooted(self, now: float) -> None:
-        self._drop_control("the vehicle has rebooted", now)
+        self._control.lose("the vehicle has rebooted")
+        self._stand_down("the vehicle has rebooted", now)
         self._done(self._book.cancel("the vehicle has rebooted", now))
         self._streams.start_over()
         self.history.clear()
@@ -458,8 +460,8 @@ class LinkCore:
         if not self._watch.taken:
             self._give_up_target(reason, now)
 
-    def _drop_control(self, reason: str, now: float) -> None:
-        self._control.lose(reason)
+    def _stand_down(self, reason: str, now: float) -> None:
+        """Control is lost: nothing that was under way is sent again."""
         self._done(self._book.cancel(reason, now, only_motion=True))
         self._give_up_target(reason, now)
         self._show_control()

@@ -148,6 +148,50 @@ def test_guided_mode_chosen_by_the_pilot_during_our_return_is_not_ours(flavor: s
     assert "not by us" in refused(rig)
 
 
+@FLAVORS
+def test_mode_that_the_pilot_chooses_after_overtaking_our_order_is_not_ours(flavor: str) -> None:
+    """We ask for the return, the pilot takes the sticks, and then returns himself: that return is his."""
+    rig = Rig(flavor).flying()
+    rig.core.request(rig.autopilot.return_to_launch(), rig.now)
+    for mode in (PILOT[flavor], RETURN[flavor]):
+        rig.peer.mode = mode
+        rig.run(1.0)
+    assert [c.commanded for c in rig.of(ModeChanged)] == [False, False]
+
+
+@FLAVORS
+def test_order_that_was_carried_out_does_not_make_the_pilots_later_choice_ours(flavor: str) -> None:
+    rig = Rig(flavor).flying()
+    rig.core.request(rig.autopilot.return_to_launch(), rig.now)
+    rig.peer.mode = RETURN[flavor]
+    rig.run(1.0)
+    rig.core.request(rig.autopilot.set_mode(GUIDED[flavor]), rig.now)
+    rig.peer.mode = GUIDED[flavor]
+    rig.run(1.0)
+    rig.peer.mode = RETURN[flavor]
+    rig.run(1.0)
+    assert [c.commanded for c in rig.of(ModeChanged)] == [True, True, False]
+
+
+@FLAVORS
+def test_target_is_not_repeated_nor_missed_once_we_fly_home(flavor: str) -> None:
+    rig = Rig(flavor).flying()
+    go(rig)
+    rig.core.request(rig.autopilot.return_to_launch(), rig.now)
+    rig.peer.mode = RETURN[flavor]
+    rig.run(20.0)
+    assert len(rig.messages("COMMAND_INT")) == 1
+    assert rig.of(TargetNotTaken) == []
+
+
+@pytest.mark.parametrize(("flavor", "altitude"), [("px4", GROUND + 20.0), ("ardupilot", 20.0)])
+def test_take_off_altitude_is_in_the_reference_of_the_autopilot(flavor: str, altitude: float) -> None:
+    rig = Rig(flavor, allow_arming=True).flying()
+    rig.core.request(rig.autopilot.take_off(20.0, GROUND), rig.now)
+    (sent,) = rig.messages("COMMAND_LONG", mavlink.MAV_CMD_NAV_TAKEOFF)
+    assert sent.param7 == pytest.approx(altitude)
+
+
 def test_hold_after_our_take_off_and_after_our_landing_is_ours_on_px4() -> None:
     rig = Rig("px4", allow_arming=True).flying()
     rig.core.request(rig.autopilot.take_off(20.0, GROUND), rig.now)
@@ -199,6 +243,7 @@ def test_stale_heartbeat_stops_repositions_and_their_repetitions(flavor: str) ->
     rig.beating = False
     rig.forget()
     rig.run(2.5)
+    assert rig.motion() == []
     assert "not been heard" in refused(rig)
     rig.run(20.0)
     assert rig.motion() == []
@@ -225,23 +270,23 @@ def test_only_an_aircraft_in_the_air_at_a_known_place_is_sent_anywhere(what: str
 
 
 @pytest.mark.parametrize(
-    ("lat", "lon", "alt"),
+    ("lat", "lon", "alt", "why"),
     [
-        (95.0, LON, ALT),
-        (LAT, 181.0, ALT),
-        (math.nan, LON, ALT),
-        (LAT, math.inf, ALT),
-        (LAT, LON, math.nan),
-        (0.0, 0.0, ALT),
-        (LAT + 2.0, LON, ALT),
-        (NORTH, LON, 20.0),
-        (NORTH, LON, ALT + 5000.0),
+        (95.0, LON, ALT, "not on earth"),
+        (LAT, 181.0, ALT, "not on earth"),
+        (math.nan, LON, ALT, "not a place"),
+        (LAT, math.inf, ALT, "not a place"),
+        (LAT, LON, math.nan, "not a place"),
+        (0.0, 0.0, ALT, "m away"),
+        (LAT + 2.0, LON, ALT, "m away"),
+        (NORTH, LON, 20.0, "above sea level"),
+        (NORTH, LON, ALT + 5000.0, "above sea level"),
     ],
 )
-def test_a_place_that_is_a_mistake_is_not_flown_to(lat: float, lon: float, alt: float) -> None:
+def test_a_place_that_is_a_mistake_is_not_flown_to(lat: float, lon: float, alt: float, why: str) -> None:
     """PX4 accepts latitude 95, 0/0, and an altitude over home taken for one above sea level."""
     rig = Rig().flying()
-    with pytest.raises(NotPermitted, match="no waypoint was sent"):
+    with pytest.raises(NotPermitted, match=why):
         go(rig, lat, lon, alt)
     assert rig.motion() == []
 
@@ -304,6 +349,24 @@ def test_disarming_ends_control() -> None:
     rig.run(2.0)
     assert [e.armed for e in rig.of(ArmedChanged)] == [False, True]
     assert "disarmed" in refused(rig)
+
+
+def test_disarmed_aircraft_is_sent_nowhere_even_in_our_control() -> None:
+    rig = Rig().flying()
+    rig.peer.armed = False
+    rig.run(1.0)
+    rig.core.take_control(rig.now)
+    assert "not armed" in refused(rig)
+
+
+def test_disarming_drops_the_repetitions_of_motion_commands() -> None:
+    rig = Rig().flying()
+    rig.core.request(rig.autopilot.change_speed(5.0), rig.now)
+    rig.peer.armed = False
+    rig.say(rig.peer.heartbeat())
+    rig.forget()
+    rig.run(10.0)
+    assert rig.motion() == []
 
 
 def test_control_cannot_be_taken_in_the_pilots_mode_or_from_a_silent_vehicle() -> None:
@@ -373,8 +436,7 @@ def test_answer_to_somebody_elses_reposition_is_not_ours() -> None:
     rig = Rig("ardupilot").flying()
     go(rig)
     rig.say(rig.peer.ack(REPOSITION, mavlink.MAV_RESULT_DENIED, target=(255, 190)))
-    rig.peer.target = (NORTH, LON, ALT)
-    rig.run(2.0)
+    rig.run(1.0)
     assert rig.of(TargetNotTaken) == []
 
 

@@ -167,8 +167,11 @@ def test_streams_do_not_pile_up_when_nothing_answers() -> None:
     rig = Rig()
     rig.acking = False
     rig.say(rig.peer.heartbeat())
-    rig.run(600.0)
-    assert rig.core._book.waiting_for(511) <= 11
+    longest = 0
+    for _ in range(120):
+        rig.run(1.0)
+        longest = max(longest, rig.core._book.waiting_for(511))
+    assert longest == 11
 
 
 def test_silence_is_link_lost_and_the_next_heartbeat_link_back() -> None:
@@ -210,8 +213,10 @@ def test_reboot_is_noticed_and_everything_is_asked_for_again() -> None:
 
 def test_a_late_datagram_is_not_a_reboot() -> None:
     rig = Rig().flying()
+    newest = rig.core.telemetry.boot_time_s
     rig.say(rig.peer.position(rig.now - 0.5))
     assert rig.of(Rebooted) == []
+    assert rig.core.telemetry.boot_time_s == newest
 
 
 def test_the_clock_of_the_vehicle_may_wrap() -> None:

@@ -28,7 +28,7 @@ from service.evidence import Observation, grid_heading
 from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, Vehicle
-from service.mavlink.events import LinkBack, LinkLost, ModeChanged, TargetNotTaken
+from service.mavlink.events import LinkLost, ModeChanged, TargetNotTaken
 from service.navigator import Cell, Navigator
 from service.search import Reason, Search
 from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
@@ -90,6 +90,7 @@ class Mission:
         self.why_stopped = ""
         self.searched = False  # the search ended because there was nothing more to gain, not by an order
         self._holds: set[str] = set()
+        self._homeward = False  # a hold on the way home goes on home
         flight = settings.flight
         self._navigator = Navigator(
             self.frame.cell_m, flight.speed_mps, flight.deceleration_mps2, flight.corner_m
@@ -110,6 +111,7 @@ class Mission:
         if before == after:
             return False
         self.state = after
+        self._homeward = after == State.RETURNING or (self._homeward and after == State.HOLDING)
         self._changed.set()
         self._drop_thought()
         log.info("%s → %s: %s", before, after, reason)
@@ -131,8 +133,8 @@ class Mission:
     async def release(self, cause: str, reason: str) -> None:
         """`cause` no longer holds; the search goes on when nothing else does."""
         self._holds.discard(cause)
-        if not self._holds and self.state == State.HOLDING:
-            await self.happen(Event.RESUME, reason)
+        if not self._holds:
+            await self.happen(Event.RETURN if self._homeward else Event.RESUME, reason)
 
     async def order(self, command: str) -> str:
         """An operator's order: hold, resume, return or abort. Returns what came of it, in words."""
@@ -157,6 +159,12 @@ class Mission:
     def flight_time(self) -> float:
         """Seconds in the air so far."""
         return (self.flight.ended or self.clock.now()) - self.flight.began if self.flight.began else 0.0
+
+    def ahead(self) -> list[LatLon]:
+        """Where the aircraft goes from here as decided: its waypoint and the path beyond; empty when it does not."""
+        if self.state not in FLYING:
+            return []
+        return [self._here(), *(self._latlon(cell) for cell in (self._navigator.waypoint, *self.path))]
 
     # ---- phases ------------------------------------------------------------------------------------------
 
@@ -261,10 +269,17 @@ class Mission:
         while self.state == State.HOLDING:
             if "detector" in self._holds and not self._detector_silent():
                 await self.release("detector", "the detector reports again")
+            elif "link" in self._holds and self._autopilot_heard():
+                await self.release("link", "the autopilot is heard again")
             elif why := self._energy_low():
                 self.why_stopped = why
                 await self._stop_searching(Event.ENERGY_LOW)
             await self._tick()
+
+    def _autopilot_heard(self) -> bool:
+        """A heartbeat has come lately."""
+        age = self.clock.now() - self.vehicle.telemetry.heartbeat_time
+        return age < self.vehicle.settings.heartbeat_fresh_s
 
     def _detector_silent(self) -> bool:
         """No report for too long; never shorter than what a busy host may need in wall time."""
@@ -367,11 +382,10 @@ class Mission:
                     await self.happen(Event.PILOT, f"the pilot or the autopilot selected {event.mode}")
             elif isinstance(event, TargetNotTaken):
                 await self._write("not taken", {"lat": event.target.lat, "lon": event.target.lon})
-                await self.hold("target", f"the waypoint is not flown: {event.reason}")
+                cause = "target" if self._autopilot_heard() else "link"
+                await self.hold(cause, f"the waypoint is not flown: {event.reason}")
             elif isinstance(event, LinkLost):
                 await self.hold("link", "the autopilot is silent")
-            elif isinstance(event, LinkBack):
-                await self.release("link", "the autopilot is heard again")
             if self.state in (State.YIELDED, State.HOLDING) and self._on_ground():
                 self.why_stopped = self.why_stopped or "landed before the search was over"
                 await self.happen(Event.LANDED, "on the ground, disarmed")

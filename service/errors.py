@@ -1,7 +1,9 @@
-"""The one error that is shown to a person instead of a traceback."""
-
-from __future__ import annotations
+"""Errors that a person can act on."""
 
 
-class BadInput(ValueError):  # noqa: N818
-    """What a person gave cannot be used; the message is one sentence: what, where, what would be right."""
+class BadInput(ValueError):
+    """What the operator gave cannot be used.
+
+    The message is one sentence: what is wrong, where (file, feature, value), and what
+    would be right. The command line prints it as it is and exits with code 2.
+    """

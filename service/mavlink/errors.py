@@ -7,13 +7,13 @@ class LinkError(Exception):
     """The link or the vehicle did not do what was asked."""
 
 
-class NotPermitted(LinkError):  # noqa: N818
+class NotPermitted(LinkError):
     """Nothing was sent, because it would not be safe or is not ours to do now."""
 
 
-class CommandFailed(LinkError):  # noqa: N818
+class CommandFailed(LinkError):
     """The vehicle refused, did not answer, or answered and did something else."""
 
 
-class NoVehicle(LinkError):  # noqa: N818
+class NoVehicle(LinkError):
     """No vehicle that can be flown was heard on the link in time."""

@@ -203,9 +203,7 @@ class Return(Behaviour):
 
 
 class FollowSticks(Behaviour):
-    """Fly as the pilot's sticks say; neutral sticks hold the place."""
-
-    lifts = True
+    """Fly as the pilot's sticks say; neutral sticks hold the place, and keep it on the ground."""
 
     def __init__(self) -> None:
         self._hold = Hold()
@@ -213,6 +211,7 @@ class FollowSticks(Behaviour):
     def steer(self, vehicle: Vehicle, demand: Demand) -> None:
         sticks = vehicle.sticks
         fresh = vehicle.time - sticks.heard_at < 1.0
+        self.lifts = fresh and sticks.throttle > 0.1
         if not fresh or max(abs(sticks.pitch), abs(sticks.roll), abs(sticks.throttle), abs(sticks.yaw)) < 0.1:
             self._hold.steer(vehicle, demand)
             return

@@ -46,13 +46,13 @@ class Px4(Firmware):
     version = 1 << 24 | 16 << 16 | 255
     capabilities = 59647 & ~M.MAV_PROTOCOL_CAPABILITY_FTP  # the recorded bits, without the file transfer
     limits = Limits(
-        cruise=5.0,
-        accelerate=2.0,
-        brake=0.55,
-        jerk=3.7,
-        position_gain=1.5,
+        cruise=4.9,
+        accelerate=2.2,
+        brake=0.48,
+        jerk=5.2,
+        position_gain=2.2,
         velocity_gain=1.3,
-        lag=0.3,
+        lag=0.45,
         climb=2.9,
         descend=1.5,
         vertical_accelerate=2.5,
@@ -88,7 +88,7 @@ class Px4(Firmware):
     serves_data_streams = False
     target_fields = (M.MAV_FRAME_GLOBAL_INT, 0, True)
     cells = 4
-    position_error_m, velocity_error_mps = 0.25, 0.06
+    position_error_m, velocity_error_mps = 0.45, 0.06
     landing_takes_s, disarm_after_landing_s = 1.0, 2.0
     home_share = 0.2
 

@@ -33,7 +33,7 @@ from service.mavlink.target import distance_m
 from sim.autopilot.process import AutopilotProcess
 from tests.fixtures_autopilot import StartAutopilot, flavor, start_autopilot
 
-from .mavlink_peer import GUIDED, PILOT, RETURN, Peer
+from .mavlink_peer import GUIDED, PILOT, RETURN, START, Peer
 
 __all__ = ["flavor", "start_autopilot"]
 
@@ -367,3 +367,24 @@ def test_events_end_when_the_link_is_closed() -> None:
         return len([event async for event in vehicle.events()])
 
     assert asyncio.run(main()) == 0
+
+
+def test_the_last_heartbeat_counts_even_if_the_event_loop_has_not_got_round_to_it() -> None:
+    async def main() -> None:
+        async with opened("udpin://127.0.0.1:0", speedup=1.0) as vehicle:
+            peer = Peer()
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
+                drone.connect(("127.0.0.1", int(vehicle.address.rsplit(":", 1)[1])))
+                drone.send(peer.heartbeat())
+                drone.send(peer.position(START))
+                drone.send(peer.landed_state())
+                await vehicle.connect(5.0)
+                assert await vehicle.wait_until(lambda t: t.landed_state == "in_air", 5.0)
+                await vehicle.enter_guided()
+                assert vehicle.why_not_reposition() is None
+                peer.mode = PILOT["px4"]
+                drone.send(peer.heartbeat())
+                with pytest.raises(NotPermitted, match="not by us"):  # at once, nothing awaited in between
+                    vehicle.reposition(north(20.0), HOME[1], HOME[2] + 20.0)
+
+    asyncio.run(main())

@@ -25,7 +25,7 @@ def go_to(
     queue: Ints,
     path: Ints,
 ) -> int:
-    """Write the trip to a look at `goal` into `path`; how many cells. `field`: [1, cells], [0, ...] if open."""
+    """Write the trip to a look at `goal` into `path`; how many cells. `field`: [1, cells], [0, ..] on open."""
     sources = np.empty((1, 4 * sight.offsets.shape[1], 3), dtype=np.int64)
     count = find_sources(goal, land, sight, sources[0])
     if field.shape[0] > 0:

@@ -56,6 +56,6 @@ class Clock:
         return asyncio.timeout(None if seconds is None else max(0.0, self.wall_seconds(seconds)))
 
     async def wait_for(self, awaitable: Awaitable[_T], seconds: float | None) -> _T:
-        """Await with a limit in service seconds; raises TimeoutError and cancels the awaitable when it is over."""
+        """Await for so many service seconds at most; then cancels the awaitable and raises TimeoutError."""
         async with self.timeout(seconds):
             return await awaitable

@@ -89,7 +89,7 @@ class RunSettings(Section):
 
 class DemoSettings(Section):
     flavor: Literal["px4", "ardupilot"] = "px4"
-    endurance_min: float = Field(default=60.0, gt=0)
+    endurance_min: float = Field(default=120.0, gt=0)
 
 
 class Settings(Section):

@@ -65,9 +65,20 @@ class World:
             *words,
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE if words[0] == "autopilot" else None,
+            start_new_session=True,  # Ctrl-C is for the service, which flies home first
         )
         self.processes.append(process)
         return process
+
+    async def ended(self) -> str:
+        """Wait until one of the processes ends by itself; returns which."""
+        waits = [asyncio.create_task(process.wait()) for process in self.processes]
+        try:
+            done, _ = await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+            return "the mock autopilot" if waits[0] in done else "the simulated detector"
+        finally:
+            for wait in waits:
+                wait.cancel()
 
     async def stop(self) -> None:
         """End what is still running."""

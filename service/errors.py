@@ -1,7 +1,7 @@
 """Errors that a person can act on."""
 
 
-class BadInput(ValueError):  # noqa: N818 - named for what it tells the operator
+class BadInput(ValueError):
     """What the operator gave cannot be used.
 
     The message is one sentence: what is wrong, where (file, feature, value), and what

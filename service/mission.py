@@ -28,7 +28,7 @@ from service.evidence import Observation, grid_heading
 from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, Vehicle
-from service.mavlink.events import LinkBack, LinkLost, ModeChanged, TargetNotTaken
+from service.mavlink.events import LinkLost, ModeChanged, TargetNotTaken
 from service.navigator import Cell, Navigator
 from service.search import Reason, Search
 from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
@@ -36,6 +36,7 @@ from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
 log = logging.getLogger("roisearch")
 LatLon = tuple[float, float]
 TICK_S = 0.1
+LEAST_PATIENCE_WALL_S = 1.5
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 
 
@@ -89,8 +90,10 @@ class Mission:
         self.why_stopped = ""
         self.searched = False  # the search ended because there was nothing more to gain, not by an order
         self._holds: set[str] = set()
+        self._homeward = False  # a hold on the way home goes on home
+        flight = settings.flight
         self._navigator = Navigator(
-            self.frame.cell_m, settings.flight.deceleration_mps2, settings.flight.corner_m
+            self.frame.cell_m, flight.speed_mps, flight.deceleration_mps2, flight.corner_m
         )
         self._thinking: asyncio.Task[Decision] | None = None
         self._hit_at: float | None = None
@@ -108,6 +111,7 @@ class Mission:
         if before == after:
             return False
         self.state = after
+        self._homeward = after == State.RETURNING or (self._homeward and after == State.HOLDING)
         self._changed.set()
         self._drop_thought()
         log.info("%s → %s: %s", before, after, reason)
@@ -129,8 +133,8 @@ class Mission:
     async def release(self, cause: str, reason: str) -> None:
         """`cause` no longer holds; the search goes on when nothing else does."""
         self._holds.discard(cause)
-        if not self._holds and self.state == State.HOLDING:
-            await self.happen(Event.RESUME, reason)
+        if not self._holds:
+            await self.happen(Event.RETURN if self._homeward else Event.RESUME, reason)
 
     async def order(self, command: str) -> str:
         """An operator's order: hold, resume, return or abort. Returns what came of it, in words."""
@@ -151,6 +155,16 @@ class Mission:
             self.why_stopped = "the operator aborted the run"
             await self.happen(Event.ABORT, "the operator asked")
         return self.state.value
+
+    def flight_time(self) -> float:
+        """Seconds in the air so far."""
+        return (self.flight.ended or self.clock.now()) - self.flight.began if self.flight.began else 0.0
+
+    def ahead(self) -> list[LatLon]:
+        """Where the aircraft goes from here as decided: its waypoint and the path beyond; empty when it does not."""
+        if self.state not in FLYING:
+            return []
+        return [self._here(), *(self._latlon(cell) for cell in (self._navigator.waypoint, *self.path))]
 
     # ---- phases ------------------------------------------------------------------------------------------
 
@@ -201,6 +215,8 @@ class Mission:
             await self.happen(Event.RETURN, "found: flying home")
         elif self.state == State.RETURNING:
             await self._go_home()
+        elif self.state == State.HOLDING:
+            await self._wait_out_the_hold()
         else:
             await self._changed.wait()
 
@@ -234,8 +250,6 @@ class Mission:
             await self.happen(Event.SUSPECT, f"a place with probability {place.probability:.0%}")
         elif place.probability < CLEARED_BELOW:
             await self.happen(Event.CLEARED, "nothing there")
-        battery = self.vehicle.telemetry.battery_percent
-        flown = self.clock.now() - self.flight.began
         enough = settings.search.stop_at_pos * self.search.grid.reachable_mass
         if self.search.record.searched >= enough and self.state == State.SEARCHING:
             self.why_stopped = f"searched to POS {self.search.record.searched:.1%}"
@@ -243,15 +257,42 @@ class Mission:
         elif self.flight.steps >= settings.search.max_steps:
             self.why_stopped = f"{self.flight.steps} steps flown"
             await self._stop_searching(Event.SEARCHED)
-        elif battery is not None and battery <= settings.flight.min_battery_percent:
-            self.why_stopped = f"battery at {battery:.0f} %"
+        elif why := self._energy_low():
+            self.why_stopped = why
             await self._stop_searching(Event.ENERGY_LOW)
-        elif flown >= settings.flight.max_flight_s:
-            self.why_stopped = f"{flown:.0f} s in the air"
-            await self._stop_searching(Event.ENERGY_LOW)
-        elif self.clock.now() - self.intake.last_at > settings.sensor.silent_after_s:
+        elif self._detector_silent():
             log.warning("no detector report for %.0f s: hovering", settings.sensor.silent_after_s)
             await self.hold("detector", "the detector is silent")
+
+    async def _wait_out_the_hold(self) -> None:
+        """Hover until the cause is gone, an operator decides, or the energy is needed for the way home."""
+        while self.state == State.HOLDING:
+            if "detector" in self._holds and not self._detector_silent():
+                await self.release("detector", "the detector reports again")
+            elif "link" in self._holds and self._autopilot_heard():
+                await self.release("link", "the autopilot is heard again")
+            elif why := self._energy_low():
+                self.why_stopped = why
+                await self._stop_searching(Event.ENERGY_LOW)
+            await self._tick()
+
+    def _autopilot_heard(self) -> bool:
+        """A heartbeat has come lately."""
+        age = self.clock.now() - self.vehicle.telemetry.heartbeat_time
+        return age < self.vehicle.settings.heartbeat_fresh_s
+
+    def _detector_silent(self) -> bool:
+        """No report for too long; never shorter than what a busy host may need in wall time."""
+        limit = max(self.settings.sensor.silent_after_s, LEAST_PATIENCE_WALL_S * self.clock.speedup)
+        return self.clock.now() - self.intake.last_at > limit
+
+    def _energy_low(self) -> str:
+        """Why the aircraft must fly home now, or nothing."""
+        battery = self.vehicle.telemetry.battery_percent
+        flown = self.flight_time()
+        if battery is not None and battery <= self.settings.flight.min_battery_percent:
+            return f"battery at {battery:.0f} %"
+        return f"{flown:.0f} s in the air" if flown >= self.settings.flight.max_flight_s else ""
 
     async def _stop_searching(self, event: Event) -> None:
         self.searched = True
@@ -272,7 +313,7 @@ class Mission:
             navigator.decide(decision.path)
             await self._decided(decision)
         thinking_s = self.settings.search.deadline_s * self.clock.speedup
-        if self._thinking is None and navigator.wants_decision(remaining, speed, thinking_s):
+        if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
             self._thinking = asyncio.create_task(
                 self.search.decide(navigator.waypoint, navigator.heading, self._unseen(navigator.ahead))
             )
@@ -286,8 +327,6 @@ class Mission:
 
     def observed(self, observation: Observation, arrived: float) -> None:
         """An observation was applied (called by the intake): a hit asks for a new decision at once."""
-        if self.state == State.HOLDING and "detector" in self._holds:
-            self._group.create_task(self.release("detector", "the detector reports again"))
         if not observation.hits.any():
             return
         for lat, lon in self.frame.to_latlon(observation.cells[observation.hits]):
@@ -343,11 +382,10 @@ class Mission:
                     await self.happen(Event.PILOT, f"the pilot or the autopilot selected {event.mode}")
             elif isinstance(event, TargetNotTaken):
                 await self._write("not taken", {"lat": event.target.lat, "lon": event.target.lon})
-                await self.hold("target", f"the waypoint is not flown: {event.reason}")
+                cause = "target" if self._autopilot_heard() else "link"
+                await self.hold(cause, f"the waypoint is not flown: {event.reason}")
             elif isinstance(event, LinkLost):
                 await self.hold("link", "the autopilot is silent")
-            elif isinstance(event, LinkBack):
-                await self.release("link", "the autopilot is heard again")
             if self.state in (State.YIELDED, State.HOLDING) and self._on_ground():
                 self.why_stopped = self.why_stopped or "landed before the search was over"
                 await self.happen(Event.LANDED, "on the ground, disarmed")

@@ -51,10 +51,12 @@ def straight_part(start: Cell, path: Sequence[Cell]) -> list[Cell]:
 class Navigator:
     """The committed cells of one flight.
 
-    `cell_m` metres a cell; `deceleration_mps2` what the autopilot brakes with; `corner_m` how early a turn is sent.
+    `cell_m` metres a cell; `speed_mps` what the aircraft is to fly at, and `deceleration_mps2` what its autopilot
+    brakes with; `corner_m` how early a turn is sent.
     """
 
     cell_m: float
+    speed_mps: float
     deceleration_mps2: float
     corner_m: float
     waypoint: Cell = (0, 0)
@@ -88,18 +90,19 @@ class Navigator:
         """True when the next target is known but not sent yet."""
         return bool(self._next)
 
-    def lead_m(self, speed_mps: float) -> float:
-        """How far before its target an aircraft starts to brake, reaction included, in metres."""
-        return speed_mps**2 / (2.0 * self.deceleration_mps2) + speed_mps * REACTION_S + 1.0
+    @property
+    def lead_m(self) -> float:
+        """How far before its target the aircraft starts to brake from full speed, reaction included, in metres.
 
-    def wants_decision(self, remaining_m: float, speed_mps: float, thinking_s: float) -> bool:
+        Of the speed that is wanted, not of the speed now: a target closer than this keeps an aircraft slow.
+        """
+        return self.speed_mps**2 / (2.0 * self.deceleration_mps2) + self.speed_mps * REACTION_S
+
+    def wants_decision(self, remaining_m: float, thinking_s: float) -> bool:
         """True when it is time to decide what comes after the waypoint."""
         if self._next:
             return False
-        return (
-            self._at_once
-            or remaining_m <= self.lead_m(speed_mps) + speed_mps * thinking_s + 0.25 * self.cell_m
-        )
+        return self._at_once or remaining_m <= self.lead_m + self.speed_mps * thinking_s + 0.25 * self.cell_m
 
     def decide(self, path: Sequence[Cell]) -> None:
         """Take a decision's path, which starts at a neighbour of the waypoint."""
@@ -114,7 +117,7 @@ class Navigator:
         slow = speed_mps < 0.5 and remaining_m < 0.3 * self.cell_m
         if not (self._at_once or straight_on or slow or remaining_m <= self.corner_m):
             return None
-        wanted = self.lead_m(speed_mps) - (remaining_m if straight_on else 0.0)
+        wanted = self.lead_m - (remaining_m if straight_on else 0.0)
         count = max(1, min(len(self._next), math.ceil(wanted / self.cell_m)))
         sent = self._next[:count]
         self._ahead = (*self._ahead, *sent)

@@ -28,6 +28,7 @@ class Scene:
     pod: NDArray[np.float64]
     labels: NDArray[np.integer[Any]]
     track: Sequence[LatLon]
+    ahead: Sequence[LatLon]
     hits: Sequence[LatLon]
     aircraft: LatLon | None
     found: LatLon | None
@@ -40,10 +41,9 @@ def draw_scene(scene: Scene) -> bytes:
     grid, frame = scene.grid, scene.grid.frame
     rows, cols = frame.shape
     width, height = cols * frame.cell_m, rows * frame.cell_m
-    panel_width = 6.4
-    figure = Figure(
-        figsize=(2 * panel_width + 1.6, panel_width * height / width + 1.3), dpi=110, layout="constrained"
-    )
+    scale = min(6.4 / width, 6.4 / height)  # inches a metre
+    size = (2 * max(width * scale, 3.6) + 2.2, height * scale + 1.5)
+    figure = Figure(figsize=size, dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     extent = (0.0, width, height, 0.0)
     shown = np.where(grid.searchable, scene.probability, np.nan)
@@ -99,6 +99,7 @@ def _paths(axes: Axes, scene: Scene, colour: str) -> None:
             axes.plot(metres[:, 0], metres[:, 1], style, **options)
 
     plot(scene.track, "-", color="tab:orange", lw=1.0, alpha=0.9, label="track")
+    plot(scene.ahead, "--", color="tab:red", lw=1.2, label="decided")
     plot(scene.hits, "x", color="tab:red", ms=6, mew=1.5, label="hits")
     plot([scene.grid.launch], "^", color=colour, mec="tab:blue", ms=9, label="launch")
     plot(

@@ -217,6 +217,7 @@ class Service:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, stop, number.name)
         display = asyncio.create_task(show(self.console, self.state))
+        watch = asyncio.create_task(self._watch_world(mission))
         try:
             await flying
         except* (LinkError, JournalLost) as group:
@@ -229,8 +230,17 @@ class Service:
             mission.state = State.ABORTED
         finally:
             display.cancel()
+            watch.cancel()
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.remove_signal_handler(number)
+
+    async def _watch_world(self, mission: Mission) -> None:
+        """End the run when a process of the built-in world is gone: there is nothing left to fly."""
+        if self.world is not None:
+            gone = await self.world.ended()
+            if mission.state not in FINAL:
+                log.error("%s has ended", gone)
+                await mission.order("abort")
 
     def _pose_at(self, vehicle: Vehicle) -> Any:
         def look_up(moment: float) -> Pose | None:
@@ -278,7 +288,7 @@ class Service:
                 telemetry.heading_deg,
                 telemetry.position_time,
             )
-        flown = self.clock.now() - mission.flight.began if mission and mission.flight.began else 0.0
+        flown = mission.flight_time() if mission else 0.0
         return {
             "state": mission.state if mission else State.WAITING,
             "area": self.area.name,
@@ -363,6 +373,7 @@ class Service:
                 pod=self.search.record.pod(),
                 labels=self.search.regions.labels,
                 track=[(lat, lon) for _, lat, lon, _ in mission.flight.track] if mission else [],
+                ahead=mission.ahead() if mission else [],
                 hits=mission.flight.hits if mission else [],
                 aircraft=(pose["lat"], pose["lon"]) if pose else None,
                 found=(found.lat, found.lon) if found else None,
@@ -382,7 +393,7 @@ class Service:
         if mission.state == State.DONE and not found and not mission.searched:
             outcome = "aborted"
         place = self.search.place
-        flown = (flight.ended or self.clock.now()) - flight.began if flight.began else 0.0
+        flown = mission.flight_time()
         report: dict[str, Any] = {
             "outcome": outcome,
             "position": {"lat": found.lat, "lon": found.lon} if found else None,

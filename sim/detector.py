@@ -39,16 +39,14 @@ class Detector:
         self._prefix = uuid.uuid4().hex[:12]
         self._count = 0
 
-    def frame(self, state: dict[str, Any]) -> dict[str, Any] | None:
-        """The report of one frame, from the service's state; None while there is no footprint."""
+    def frame(self, state: dict[str, Any]) -> dict[str, Any]:
+        """The report of one frame, from the service's state. A frame between cells reports nothing seen."""
         footprint = state["footprint"]
         cells = {(cell["row"], cell["col"]): cell for cell in footprint["cells"]}
         for gone in self._verdicts.keys() - cells.keys():
             del self._verdicts[gone]
-        if not cells or not footprint["counts"]:
-            return None
         detections = []
-        for key, cell in cells.items():
+        for key, cell in cells.items() if footprint["counts"] else ():
             there = self.target is not None and contains(cell["corners"], self.target)
             if key not in self._verdicts:
                 chance = self.p_tp if there else 1.0 - self.p_tn
@@ -80,9 +78,7 @@ def follow(client: httpx.Client, detector: Detector, rate_hz: float, patience_s:
             pose = state["pose"]
             if pose is not None and pose["time"] != last_pose:
                 last_pose = pose["time"]
-                report = detector.frame(state)
-                if report is not None:
-                    client.post("/api/reports", json=report).raise_for_status()
+                client.post("/api/reports", json=detector.frame(state)).raise_for_status()
         except httpx.HTTPError as error:
             if began - heard > patience_s:
                 print(f"roisearch-sim detector: the service is gone ({error})", file=sys.stderr)

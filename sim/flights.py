@@ -114,7 +114,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--flavors", default="px4,ardupilot", help="mock autopilots, separated by commas")
     parser.add_argument("--seeds", type=int, default=20, help="how many seeds per area and flavour, from 1")
     parser.add_argument("--first-seed", type=int, default=1)
-    parser.add_argument("--speedup", type=float, default=40.0)
+    parser.add_argument("--speedup", type=float, default=20.0)
     parser.add_argument("--jobs", type=int, default=2, help="flights at a time")
     parser.add_argument(
         "--within", type=float, default=1.5, metavar="CELLS", help="largest error of a good flight"

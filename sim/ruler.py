@@ -1,10 +1,10 @@
 """The exact ruler: the detection curve of a planner, without waiting for luck.
 
-The planner is run as if the target stayed undetected. For each cell u is the mass that is still undetected there;
-every look at the cell adds p_tp * u to F and leaves (1 - p_tp) * u. F(t) is then the distribution of the time of
-the first true hit over all targets and all true detections, for this one sequence of looks. With p_tn < 1 false
-alarms are drawn at every cell looked at; F is exact for them as drawn, except that a target's own cell cannot give a
-false alarm, which the drawn sequence ignores.
+The planner is run as if the target stayed undetected. For each cell u is the mass that is still undetected
+there; every look at the cell adds p_tp * u to F and leaves (1 - p_tp) * u. F(t) is then the distribution of
+the time of the first true hit over all targets and all true detections, for this one sequence of looks.
+With p_tn < 1 false alarms are drawn at every cell looked at; F is exact for them as drawn, except that a
+target's own cell cannot give a false alarm, which the drawn sequence ignores.
 """
 
 from __future__ import annotations
@@ -33,12 +33,10 @@ def detection_curve(
 ) -> NDArray[np.float64]:
     """F of `planner` on `prior`, float [steps + 1]; it plans at every step.
 
-    Args:
-        p_tp, p_tn: of every cell of the field of view.
-        fov: what is seen; a point unless given. The planner must have been made for the same.
-        deadline_s: handed to `plan`.
-        stop_below: stop when less than this is undetected, and count F as constant from there on, which can only
-            overstate the expected time.
+    Args: p_tp, p_tn: of every cell of the field of view. fov: what is seen; a point unless given. The
+        planner must have been made for the same. deadline_s: handed to `plan`. stop_below: stop when less
+        than this is undetected, and count F as constant from there on, which can only overstate the
+        expected time.
     """
     view = fov or FieldOfView.point()
     belief = Belief(prior, searchable=searchable)

@@ -1,12 +1,12 @@
 """A map that a planner may search on in thought: looks deplete it, and everything is put back afterwards.
 
-Cells lie row by row. Blocks of 8 x 8 cells keep the largest worth in them, areas of 8 x 8 blocks the largest of
-their blocks, so that the most worthwhile cell is found without reading the map. `keep` copies a block before it is
-changed for the first time in a simulation; `restore` puts all of them back, to the last bit. So a simulation costs
-what it touches, never the map.
+Cells lie row by row. Blocks of 8 x 8 cells keep the largest worth in them, areas of 8 x 8 blocks the
+largest of their blocks, so that the most worthwhile cell is found without reading the map. `keep` copies a
+block before it is changed for the first time in a simulation; `restore` puts all of them back, to the last
+bit. So a simulation costs what it touches, never the map.
 
-The *mass* of a cell is the weight of the target being there undetected. The *worth* of a cell is what a look from it
-detects, on average over the headings; with a point field of view both are one array.
+The *mass* of a cell is the weight of the target being there undetected. The *worth* of a cell is what a
+look from it detects, on average over the headings; with a point field of view both are one array.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ LEVELS = 96
 class Chart(NamedTuple):
     """The map in thought.
 
-    mass, worth: float [cells]; the same array when the field of view is a point. peaks: float [block rows, block
-    cols], the largest worth in a block. tops: float [area rows, area cols]. levels: float [LEVELS, 2], number of
-    cells and mass by powers of two below `scale` [1], for what remains at a horizon.
-    legal: uint8 [cells], bit h set when move h is possible; 0 for a cell that cannot be entered.
-    offsets: int [4, k, 2], p_tp: float [k], what is seen by heading. spread: int [n, 2], share: float [n]: a cell's
-    mass m adds share * m to the worth of the cell `spread` away.
-    stamp: int [blocks], number of the simulation that last kept a block; log: int [most], kept blocks;
-    old: float [most, 2, 64], their mass and worth; old_peak: float [most]; counters: int [4], number of the
-    simulation, kept blocks, state of the random numbers (unused here), reserved.
+    mass, worth: float [cells]; the same array when the field of view is a point. peaks: float [block rows,
+    block cols], the largest worth in a block. tops: float [area rows, area cols]. levels: float [LEVELS,
+    2], number of cells and mass by powers of two below `scale` [1], for what remains at a horizon. legal:
+    uint8 [cells], bit h set when move h is possible; 0 for a cell that cannot be entered. offsets: int [4,
+    k, 2], p_tp: float [k], what is seen by heading. spread: int [n, 2], share: float [n]: a cell's mass m
+    adds share * m to the worth of the cell `spread` away. stamp: int [blocks], number of the simulation
+    that last kept a block; log: int [most], kept blocks; old: float [most, 2, 64], their mass and worth;
+    old_peak: float [most]; counters: int [4], number of the simulation, kept blocks, state of the random
+    numbers (unused here), reserved.
     """
 
     rows: int
@@ -264,7 +264,7 @@ def gain_from(chart: Chart, row: int, col: int, heading: int) -> float:
 
 @kernel
 def look(chart: Chart, row: int, col: int, heading: int, kept: bool) -> float:
-    """Look from this pose and see nothing: the cells seen keep 1 - p_tp of their mass. Returns what it detects."""
+    """Look from this pose, see nothing, and leave 1 - p_tp of each mass; returns what the look detects."""
     total = 0.0
     for i in range(chart.offsets.shape[1]):
         r, c = row + chart.offsets[heading, i, 0], col + chart.offsets[heading, i, 1]
@@ -277,11 +277,13 @@ def look(chart: Chart, row: int, col: int, heading: int, kept: bool) -> float:
 
 
 @kernel
-def time_to_clear(levels: Floats, undetected: float, looks_per_halving: float, looks_per_step: float) -> float:
+def time_to_clear(
+    levels: Floats, undetected: float, looks_per_halving: float, looks_per_step: float
+) -> float:
     """The area under the survival curve of clearing what is left, most massive cells first, without travel.
 
-    levels: float [LEVELS, 2], cells and mass by powers of two. Each cell of a level needs `looks_per_halving`
-    looks to fall to the next one. Looks come `looks_per_step` in a step.
+    levels: float [LEVELS, 2], cells and mass by powers of two. Each cell of a level needs
+    `looks_per_halving` looks to fall to the next one. Looks come `looks_per_step` in a step.
     """
     area = 0.0
     cells = mass = 0.0

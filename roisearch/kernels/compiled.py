@@ -29,7 +29,8 @@ def _cache_folder() -> Path:
     return base / f"kernels-{digest.hexdigest()[:12]}"
 
 
-numba.config.CACHE_DIR = str(_cache_folder())
+_config: Any = numba.config
+_config.CACHE_DIR = str(_cache_folder())
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:

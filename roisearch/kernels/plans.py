@@ -1,22 +1,24 @@
 """PUCT over sweeps: a tree along the plan that is being flown, grown a little at every step.
 
-The lite MDP-O with options that sweep. The map in the tree is depleted by what the tree looks at and is otherwise
-static: no observation branches. So the tree has no chance nodes, the best return is attainable, and one line of
-actions, the *plan*, is always the best known. Nodes stand along the plan, `spacing` steps apart. In each node the
-actions are to *keep to the plan*, to sweep any one region down to a level, to sweep anywhere, and at the root the
-four moves. An iteration
+The lite MDP-O with options that sweep. The map in the tree is depleted by what the tree looks at and is
+otherwise static: no observation branches. So the tree has no chance nodes, the best return is attainable,
+and one line of actions, the *plan*, is always the best known. Nodes stand along the plan, `spacing` steps
+apart. In each node the actions are to *keep to the plan*, to sweep any one region down to a level, to sweep
+anywhere, and at the root the four moves. An iteration
 
-1. selects: from the root it follows argmax Q + explore * P * sqrt(N) / (1 + n), flying the plan as long as that
-   says to keep to it, and adds one node where the plan has none yet;
-2. simulates: at another action, it draws how far down to sweep (lambda), for how long at most, and with which balance of
-   worth and distance, and follows that sweep; then the index rule, as the rollout, to the horizon of the plan;
-3. evaluates: the area under the survival curve, which is the expected time, plus what clearing the rest takes without
-   travel, times `overhead`;
-4. backs up: the visits, and the least loss against the plan. When the new line is better it becomes the plan, and the
-   nodes after the branch are dropped with it.
+1. selects: from the root it follows argmax Q + explore * P * sqrt(N) / (1 + n), flying the plan as long as
+   that says to keep to it, and adds one node where the plan has none yet;
+2. simulates: at another action, it draws how far down to sweep (lambda), for how long at most, and with
+   which balance of worth and distance, and follows that sweep; then the index rule, as the rollout, to the
+   horizon of the plan;
+3. evaluates: the area under the survival curve, which is the expected time, plus what clearing the rest
+   takes without travel, times `overhead`;
+4. backs up: the visits, and the least loss against the plan. When the new line is better it becomes the
+   plan, and the nodes after the branch are dropped with it.
 
-Q is 1 for keeping to the plan and 1 / (1 + loss / (spread * expected time)) for the best seen of another action; it is 1
-for one not tried. P is `keep` for keeping to the plan; the rest is divided in proportion to each region's best index.
+Q is 1 for keeping to the plan and 1 / (1 + loss / (spread * expected time)) for the best seen of another
+action; it is 1 for one not tried. P is `keep` for keeping to the plan; the rest is divided in proportion to
+each region's best index.
 """
 
 from __future__ import annotations
@@ -45,8 +47,8 @@ INCREMENT = np.uint64(1442695040888963407)
 class Rules(NamedTuple):
     """The settings of the search; see `SweepSettings`.
 
-    nears: float [balances, distances], score of a cell by distance; row 0 is the rollout's.
-    followers: how many of the first rows may be a rollout's. looks_per_halving, looks_per_step: `time_to_clear`.
+    nears: float [balances, distances], score of a cell by distance; row 0 is the rollout's. followers: how
+    many of the first rows may be a rollout's. looks_per_halving, looks_per_step: `time_to_clear`.
     """
 
     nears: Floats
@@ -63,14 +65,13 @@ class Rules(NamedTuple):
 class Tree(NamedTuple):
     """The plan and the nodes along it.
 
-    path: int [most], cells of the plan; now, length and nodes are in `mark` [NOW, LENGTH, NODES].
-    action: int [most], what each step of the plan belongs to: a region's label, or ANYWHERE. trial, trial_action:
-    the same of the line being tried.
-    at: int [nodes], where on the path a node stands. stats: float [nodes, actions, 3]: P(a), least loss (of
-    keeping to the plan: 0), visits. Actions: 0-3 moves, 4 anywhere, 4 + k region k, last: keep to the plan.
-    worths: float [nodes, regions + 1], the largest worth in each region. scores: float [regions + 1],
-    room.
-    value: float [EXPECTED, ...], area under the survival curve of the plan, the rest included.
+    path: int [most], cells of the plan; now, length and nodes are in `mark` [NOW, LENGTH, NODES]. action:
+    int [most], what each step of the plan belongs to: a region's label, or ANYWHERE. trial, trial_action:
+    the same of the line being tried. at: int [nodes], where on the path a node stands. stats: float [nodes,
+    actions, 3]: P(a), least loss (of keeping to the plan: 0), visits. Actions: 0-3 moves, 4 anywhere, 4 + k
+    region k, last: keep to the plan. worths: float [nodes, regions + 1], the largest worth in each region.
+    scores: float [regions + 1], room. value: float [EXPECTED, ...], area under the survival curve of the
+    plan, the rest included.
     """
 
     path: Ints
@@ -92,7 +93,7 @@ EXPECTED, UNDETECTED = 0, 1
 
 @kernel
 def draw(state: NDArray[np.uint64]) -> float:
-    """A number from 0 to just below 1, from a 64-bit linear congruential generator (Knuth's MMIX constants)."""
+    """A number from 0 to just below 1, from a linear congruential generator (Knuth's MMIX constants)."""
     state[0] = state[0] * MULTIPLIER + INCREMENT
     return float(np.int64(state[0] >> np.uint64(11))) * 2.0**-53
 
@@ -286,8 +287,8 @@ def iterate(
     turned = t + steps
     follower = int(draw(state) * rules.followers) if draw(state) < 0.3 else 0
     more, undetected, steps, row, col, heading = sweep(
-        row, col, heading, chart, rules.nears[follower], labels, home, ANYWHERE, 0.0, end - turned, undetected,
-        tree.trial, turned, wave,
+        row, col, heading, chart, rules.nears[follower], labels, home, ANYWHERE, 0.0, end - turned,
+        undetected, tree.trial, turned, wave,
     )  # fmt: skip
     area += more + rest(chart, undetected, rules)
     restore(chart)
@@ -330,7 +331,15 @@ def advance(
 ) -> tuple[int, int, int]:
     """Fly the next steps of the plan for good, seeing nothing; returns the pose."""
     area, undetected, row, col, heading = fly(
-        row, col, heading, chart, tree.value[UNDETECTED], tree.path, tree.mark[NOW], tree.mark[NOW] + steps, False
+        row,
+        col,
+        heading,
+        chart,
+        tree.value[UNDETECTED],
+        tree.path,
+        tree.mark[NOW],
+        tree.mark[NOW] + steps,
+        False,
     )
     tree.value[EXPECTED] -= area
     tree.value[UNDETECTED] = undetected
@@ -348,7 +357,7 @@ def settle_root(
     labels: NDArray[np.int32],
     home: NDArray[np.int32],
 ) -> None:
-    """Drop the nodes that were passed; the last of them becomes the root, with its numbers, if none stands here."""
+    """Drop the nodes that were passed; the last of them becomes the root, with its numbers."""
     now = tree.mark[NOW]
     passed = 0
     while passed < tree.mark[NODES] and tree.at[passed] <= now:
@@ -423,8 +432,8 @@ def replan(
     row, col, heading = start_row, start_col, start_heading
     begin(chart)
     area, undetected, steps, row, col, heading = sweep(
-        row, col, heading, chart, rules.nears[0], labels, home, ANYWHERE, 0.0, horizon, tree.value[UNDETECTED],
-        tree.path, 0, wave,
+        row, col, heading, chart, rules.nears[0], labels, home, ANYWHERE, 0.0, horizon,
+        tree.value[UNDETECTED], tree.path, 0, wave,
     )  # fmt: skip
     area += rest(chart, undetected, rules)
     restore(chart)

@@ -1,12 +1,12 @@
 """Sweeps: where to look next by worth against distance, and following that rule for many steps in thought.
 
-The rule goes towards the cell with the largest worth * near[distance], `near` falling with the distance. With
-near[d] = (d + 1) ** -0.4 it is the index rule m ** 2.5 / (d + 1). Restricted to one region and to cells worth at
-least a floor, it is the option 'sweep this region down to that level'.
+The rule goes towards the cell with the largest worth * near[distance], `near` falling with the distance.
+With near[d] = (d + 1) ** -0.4 it is the index rule m ** 2.5 / (d + 1). Restricted to one region and to
+cells worth at least a floor, it is the option 'sweep this region down to that level'.
 
-On open ground the distance is the number of rows and columns between; blocks that cannot hold a better cell are
-skipped. Around obstacles a wave from the drone visits the cells in the order of their true distance, until no cell
-farther out can be better.
+On open ground the distance is the number of rows and columns between; blocks that cannot hold a better cell
+are skipped. Around obstacles a wave from the drone visits the cells in the order of their true distance,
+until no cell farther out can be better.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ RING, HOLD = 2, 4
 
 class Wave(NamedTuple):
     """Room for a wave around obstacles: `seen` [cells] number of the wave, `origin` [cells] the cell before,
-    `queue` [cells], `steps` [cells], `count` [1] number of the last wave. All [0] on open ground."""
+    `queue` [cells], `steps` [cells], `number` [1] the number of the last wave. All [0] on open ground."""
 
     seen: Ints
     origin: Ints
     queue: Ints
     steps: Ints
-    count: Ints
+    number: Ints
 
 
 @kernel
@@ -58,7 +58,7 @@ def best_neighbour(
     region: int,
     floor: float,
 ) -> tuple[int, float]:
-    """The neighbour whose look is worth most, seen with the heading of the move; straight on first among equals."""
+    """The neighbour whose look is worth most, with the heading of the move; straight on among equals."""
     best, score = -1, 0.0
     legal = chart.legal[row * chart.cols + col]
     for turn in range(4):
@@ -68,7 +68,11 @@ def best_neighbour(
         to_row, to_col = row + row_of_move(move), col + col_of_move(move)
         if region >= 0 and labels[to_row * chart.cols + to_col] != region:
             continue
-        worth = chart.mass[to_row * chart.cols + to_col] if chart.is_point else gain_from(chart, to_row, to_col, move)
+        worth = (
+            chart.mass[to_row * chart.cols + to_col]
+            if chart.is_point
+            else gain_from(chart, to_row, to_col, move)
+        )
         if worth >= floor and worth * near[1] > score:
             best, score = move, worth * near[1]
     return best, score
@@ -90,7 +94,7 @@ def scan_block(
     best_cell: int,
     best: float,
 ) -> tuple[int, float]:
-    """The best cell of a block, if it is better than `best`; neighbours of the drone and its own cell excluded."""
+    """The best cell of a block, if better than `best`; the drone's cell and its neighbours are left out."""
     enough = max(floor, best / near[2])
     for r in range(block_row * BLOCK, min(block_row * BLOCK + BLOCK, rows)):
         apart = abs(r - row)
@@ -164,7 +168,21 @@ def best_close(
     """As `best_far`, but only RING blocks around the drone's own."""
     own_row, own_col = row // BLOCK, col // BLOCK
     cell = -1
-    cell, best = scan_block(own_row, own_col, row, col, chart.rows, chart.cols, chart.worth, near, labels, region, floor, cell, best)
+    cell, best = scan_block(
+        own_row,
+        own_col,
+        row,
+        col,
+        chart.rows,
+        chart.cols,
+        chart.worth,
+        near,
+        labels,
+        region,
+        floor,
+        cell,
+        best,
+    )
     for block_row in range(max(0, own_row - RING), min(chart.peaks.shape[0], own_row + RING + 1)):
         apart = gap(row, block_row * BLOCK, BLOCK)
         for block_col in range(max(0, own_col - RING), min(chart.peaks.shape[1], own_col + RING + 1)):
@@ -173,7 +191,19 @@ def best_close(
             peak = chart.peaks[block_row, block_col]
             if peak >= floor and peak * near[max(1, apart + gap(col, block_col * BLOCK, BLOCK))] > best:
                 cell, best = scan_block(
-                    block_row, block_col, row, col, chart.rows, chart.cols, chart.worth, near, labels, region, floor, cell, best
+                    block_row,
+                    block_col,
+                    row,
+                    col,
+                    chart.rows,
+                    chart.cols,
+                    chart.worth,
+                    near,
+                    labels,
+                    region,
+                    floor,
+                    cell,
+                    best,
                 )
     return cell, best
 
@@ -190,7 +220,7 @@ def best_far(
     floor: float,
     best: float,
 ) -> tuple[int, float]:
-    """The best cell two or more steps away on open ground, if its score is above `best`; (-1, best) if none is."""
+    """The best cell two or more steps away on open ground, if above `best`; (-1, best) if there is none."""
     cell = -1
     for area_row in range(chart.tops.shape[0]):
         far_row = gap(row, area_row * AREA, AREA)
@@ -202,13 +232,28 @@ def best_far(
                 apart = gap(row, block_row * BLOCK, BLOCK)
                 for block_col in range(area_col * BLOCK, min(area_col * BLOCK + BLOCK, chart.peaks.shape[1])):
                     peak = chart.peaks[block_row, block_col]
-                    if peak < floor or peak * near[max(1, apart + gap(col, block_col * BLOCK, BLOCK))] <= best:
+                    if (
+                        peak < floor
+                        or peak * near[max(1, apart + gap(col, block_col * BLOCK, BLOCK))] <= best
+                    ):
                         continue
                     lives = home[block_row * chart.peaks.shape[1] + block_col]
                     if region >= 0 and lives >= 0 and lives != region:
                         continue
                     cell, best = scan_block(
-                        block_row, block_col, row, col, chart.rows, chart.cols, chart.worth, near, labels, region, floor, cell, best
+                        block_row,
+                        block_col,
+                        row,
+                        col,
+                        chart.rows,
+                        chart.cols,
+                        chart.worth,
+                        near,
+                        labels,
+                        region,
+                        floor,
+                        cell,
+                        best,
                     )
     return cell, best
 
@@ -230,8 +275,8 @@ def best_wave(
     for area_row in range(chart.tops.shape[0]):
         for area_col in range(chart.tops.shape[1]):
             top = max(top, chart.tops[area_row, area_col])
-    wave.count[0] += 1
-    number = wave.count[0]
+    wave.number[0] += 1
+    number = wave.number[0]
     start = row * chart.cols + col
     wave.seen[start], wave.steps[start], wave.queue[0] = number, 0, start
     head, tail, found = 0, 1, -1
@@ -242,7 +287,12 @@ def best_wave(
         if top * near[max(1, steps)] <= best:
             break
         worth = chart.worth[cell]
-        if steps >= 2 and worth >= floor and worth * near[steps] > best and (region < 0 or labels[cell] == region):
+        if (
+            steps >= 2
+            and worth >= floor
+            and worth * near[steps] > best
+            and (region < 0 or labels[cell] == region)
+        ):
             found, best = cell, worth * near[steps]
         for move in range(4):
             if chart.legal[cell] >> move & 1:
@@ -352,7 +402,15 @@ def sweep(
 
 @kernel
 def fly(
-    row: int, col: int, heading: int, chart: Chart, undetected: float, path: Ints, first: int, last: int, kept: bool
+    row: int,
+    col: int,
+    heading: int,
+    chart: Chart,
+    undetected: float,
+    path: Ints,
+    first: int,
+    last: int,
+    kept: bool,
 ) -> tuple[float, float, int, int, int]:
     """Fly path[first:last], seeing nothing; as `sweep` without the steps."""
     area = 0.0

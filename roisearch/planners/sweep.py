@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -38,13 +38,40 @@ class SweepSettings:
     """
 
     iterations: int | None = 4
-    horizon: int = 4000
+    horizon: int = 2500
     explore: float = 1.0
     keep: float = 0.75
     spread: float = 0.02
     spacing: int = 32
     overhead: float = 1.25
     path: int = 64
+
+    def __post_init__(self) -> None:
+        if self.iterations is not None and self.iterations < 0:
+            raise ValueError(f"iterations must be 0 or more, not {self.iterations}")
+        for name, least in (("horizon", 64), ("spacing", 1), ("path", 1)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
+        if not (0.0 < self.keep < 1.0 and self.explore >= 0.0 and self.spread > 0.0 and self.overhead >= 1.0):
+            raise ValueError(
+                "keep must be between 0 and 1, explore 0 or more, spread above 0, overhead at least 1"
+            )
+
+
+def sweep_settings_for(name: str, options: dict[str, Any]) -> SweepSettings:
+    """The settings with single `options` changed.
+
+    Raises:
+        ValueError: when there is no such option, or a value is out of range.
+    """
+    known = sorted(field.name for field in fields(SweepSettings))
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise ValueError(
+            f"{name} has no option '{unknown[0]}'; it has {', '.join(known)}, "
+            "and with preset='trips' those of PuctSettings"
+        )
+    return SweepSettings(**options)
 
 
 class Changes:
@@ -88,8 +115,8 @@ class Watch:
 class SweepPlanner:
     """Plans by PUCT over sweeps; see `roisearch.kernels.plans`.
 
-    It keeps its plan from one call to the next. When the drone flew along it and saw nothing, the search goes on where
-    it stopped; after a hit, or from another place, it plans anew.
+    It keeps its plan from one call to the next. When the drone flew along it and saw nothing, the search
+    goes on where it stopped; after a hit, or from another place, it plans anew.
 
     Args:
         fov: the field of view; its p_tp is used in the tree.
@@ -154,8 +181,8 @@ class SweepPlanner:
             old_levels=np.zeros_like(levels),
             counters=np.zeros(4, dtype=np.int64),
         )
-        room = 0 if scene.ground.is_open else cells
-        self._wave = Wave(*(np.zeros(room, dtype=np.int64) for _ in range(4)), np.zeros(1, dtype=np.int64))
+        room = [np.zeros(0 if scene.ground.is_open else cells, dtype=np.int64) for _ in range(4)]
+        self._wave = Wave(room[0], room[1], room[2], room[3], np.zeros(1, dtype=np.int64))
         regions = self._regions
         assert regions is not None
         self._labels = nearest_labels(regions.labels)
@@ -181,7 +208,10 @@ class SweepPlanner:
         s, p = self.settings, float(self._fov.p_tp.max())
         distance = np.arange(rows + cols + 2 if is_open else rows * cols + 2, dtype=np.float64)
         nears = np.array(
-            [np.maximum(distance + shift, 1.0) ** -power for power, shift in ROLLOUT_BALANCES + OPTION_BALANCES]
+            [
+                np.maximum(distance + shift, 1.0) ** -power
+                for power, shift in ROLLOUT_BALANCES + OPTION_BALANCES
+            ]
         )
         return plans.Rules(
             nears=nears,
@@ -208,9 +238,8 @@ class SweepPlanner:
         Args:
             deadline_s: seconds after which the search stops and decides with what it has.
 
-        Raises:
-            ValueError: when the drone cannot be in its cell or cannot leave it, or when there is neither a number of
-                iterations nor a deadline.
+        Raises: ValueError: when the drone cannot be in its cell or cannot leave it, or when there is
+            neither a number of iterations nor a deadline.
         """
         began = time.perf_counter()
         if self.settings.iterations is None and deadline_s is None:
@@ -227,17 +256,18 @@ class SweepPlanner:
         pose = (state.cell[0], state.cell[1], heading_index(state.heading))
         self._follow(belief, state.cell, pose)
         tree, chart, rules = self._tree, self._chart, self._rules
-        fixed = (chart, tree, rules, self._labels, self._home)
+        row, col, heading = pose
+        labels, home, wave = self._labels, self._home, self._wave
         if tree.mark[plans.LENGTH] - tree.mark[plans.NOW] < self.settings.horizon - 512:
-            plans.extend(*pose, *fixed, self.settings.horizon, self._wave)
-        plans.settle_root(pose[0], pose[1], *fixed)
+            plans.extend(row, col, heading, chart, tree, rules, labels, home, self.settings.horizon, wave)
+        plans.settle_root(row, col, chart, tree, rules, labels, home)
         done = 0
         most = self.settings.iterations
         while most is None or done < most:
             before = time.perf_counter()
             if deadline_s is not None and before + self._seconds > began + deadline_s:
                 break
-            plans.iterate(*pose, *fixed, self._wave, self._random)
+            plans.iterate(row, col, heading, chart, tree, rules, labels, home, wave, self._random)
             self._seconds = 0.9 * self._seconds + 0.1 * (time.perf_counter() - before)
             done += 1
         return self._decide(belief, scene, state.cell, done, began)
@@ -247,11 +277,9 @@ class SweepPlanner:
         chart, tree = self._chart, self._tree
         changes: Any = belief.sums_of(self._watch)
         everything, touched = changes.take()
-        horizon = self.settings.horizon
-        fixed = (chart, tree, self._rules, self._labels, self._home, horizon)
         if everything or belief is not self._belief:
             self._load(belief)
-            plans.replan(*pose, *fixed, -1, self._wave)
+            self._replan(pose, -1)
             self._pose = pose
             return
         steps = self._steps_flown(cell)
@@ -268,11 +296,18 @@ class SweepPlanner:
             changed, shock = self._correct(belief, cells)
             surprised = surprised or shock
         if surprised:
-            plans.replan(*pose, *fixed, 4 if steps >= 0 else 0, self._wave)
+            self._replan(pose, 4 if steps >= 0 else 0)
         elif changed:
             tree.value[plans.EXPECTED] = plans.evaluate(*pose, chart, tree, self._rules)
-        if tree.mark[plans.NOW] > horizon:
+        if tree.mark[plans.NOW] > self.settings.horizon:
             self._shift()
+
+    def _replan(self, pose: tuple[int, int, int], pause: int) -> None:
+        """Plan anew from here; see `plans.replan`."""
+        plans.replan(
+            *pose, self._chart, self._tree, self._rules, self._labels, self._home, self.settings.horizon,
+            pause, self._wave,
+        )  # fmt: skip
 
     def _load(self, belief: Belief) -> None:
         """Take over the whole belief."""
@@ -305,7 +340,7 @@ class SweepPlanner:
         return seen
 
     def _correct(self, belief: Belief, cells: NDArray[np.int64]) -> tuple[bool, bool]:
-        """Set the mass of cells to the belief's; whether any differed, and whether any by more than a miss can."""
+        """Set the mass of cells to the belief's; whether any differed, and whether any is a surprise."""
         flat = cells[:, 0] * self._chart.cols + cells[:, 1]
         actual = np.where(self._viewable[flat], belief.weights[flat], 0.0)
         expected = self._chart.mass[flat]
@@ -362,7 +397,7 @@ class SweepPlanner:
         )
 
     def warm_up(self, progress: Progress | None = None) -> None:
-        """Compile every kernel that a decision and an observation use, by making one of each on a tiny map."""
+        """Compile every kernel that a decision and an observation use, on a tiny map."""
         from roisearch.planners.warm import warm_up
 
         warm_up(SweepPlanner(self.settings, name=self.name, fov=self._fov), self._fov, progress)
@@ -376,7 +411,7 @@ def remark(unreachable: float) -> str:
 
 
 def spread_of(fov: FieldOfView) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """From which cells a cell is seen: offsets int [n, 2], and p_tp from there over the headings, float [n]."""
+    """From where a cell is seen: offsets int [n, 2], and p_tp from there over the headings, float [n]."""
     total: dict[tuple[int, int], float] = {}
     for seen in fov.offsets:
         for (row, col), p in zip(seen.tolist(), fov.p_tp.tolist(), strict=True):

@@ -1,7 +1,8 @@
 """The MAVLink link to the aircraft.
 
-`vehicle.Vehicle` is what the rest of the service uses. Behind it are `core` (the protocol, without sockets and without a
-clock of its own), `transports` (the wires), and `autopilots` (what differs between PX4 and ArduPilot).
+`vehicle.Vehicle` is what the rest of the service uses. Behind it are `core` (the protocol, without sockets
+and without a clock of its own), `transports` (the wires), and `autopilots` (what differs between PX4 and
+ArduPilot).
 """
 
 from service.mavlink.errors import CommandFailed, LinkError, NotPermitted, NoVehicle

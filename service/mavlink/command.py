@@ -1,11 +1,11 @@
 """Commands as values, and the book that sends, repeats and ends them.
 
-MAVLink's command protocol matches an answer to a command by the command's number only, so at most one command of
-each number is on its way. A command is repeated (with a growing `confirmation`) until it is acknowledged, and given
-up after some attempts. Two habits of real autopilots shape this:
+MAVLink's command protocol matches an answer to a command by the command's number only, so at most one command
+of each number is on its way. A command is repeated (with a growing `confirmation`) until it is acknowledged,
+and given up after some attempts. Two habits of real autopilots shape this:
 
-* PX4 acknowledges DO_SET_MODE twice, and the two may disagree. A command that asks for a mode (`goal_mode`) therefore
-  ends when the heartbeat shows that mode, whatever the acknowledgements say.
+* PX4 acknowledges DO_SET_MODE twice, and the two may disagree. A command that asks for a mode (`goal_mode`)
+  therefore ends when the heartbeat shows that mode, whatever the acknowledgements say.
 * A late second acknowledgement must not answer the next command of the same number, so after a repeated or
   twice-acknowledged command its number rests for a moment.
 """
@@ -29,8 +29,8 @@ _REST_S = 0.3
 class Command:
     """One MAV_CMD with its seven parameters (COMMAND_LONG).
 
-    `motion` marks what moves the aircraft or arms it: such a command is dropped, not repeated, once the pilot has
-    taken over or our own process has stalled.
+    `motion` marks what moves the aircraft or arms it: such a command is dropped, not repeated, once the pilot
+    has taken over or our own process has stalled, and waits while the vehicle is not heard.
     """
 
     number: int
@@ -41,6 +41,8 @@ class Command:
     attempts: int | None = None
     """How often it is sent at most; None: as often as the link's settings say."""
     label: str = ""
+    height_m: float | None = None
+    """Of a take-off: how far it climbs above home."""
 
     @property
     def name(self) -> str:
@@ -114,11 +116,13 @@ class CommandBook:
         self._ack_timeout_s = ack_timeout_s
         self._attempts = attempts
         self._in_progress_timeout_s = in_progress_timeout_s
+        self.motion_waits = False
+        """Whether commands that move the aircraft are neither sent nor repeated for now."""
         self._lanes: dict[int, _Lane] = {}
         self._next_ticket = 1
 
     def submit(self, command: Command, now: float) -> int:
-        """Send a command as soon as its number is free; returns the ticket that its CommandDone will carry."""
+        """Send a command as soon as its number is free; returns the ticket of its CommandDone."""
         ticket = self._next_ticket
         self._next_ticket += 1
         lane = self._lanes.setdefault(command.number, _Lane())
@@ -157,7 +161,7 @@ class CommandBook:
         done: list[CommandDone] = []
         for lane in self._lanes.values():
             active = lane.active
-            if active is not None and now >= active.deadline:
+            if active is not None and now >= active.deadline and not self._waits(active):
                 if active.attempts >= (active.command.attempts or self._attempts):
                     done += self._end(lane, Silent(active.attempts), now)
                 else:
@@ -177,9 +181,14 @@ class CommandBook:
         return done
 
     def _start(self, lane: _Lane, now: float) -> None:
-        if lane.active is None and lane.waiting and now >= lane.rests_until:
+        if lane.active is not None or not lane.waiting or now < lane.rests_until:
+            return
+        if not self._waits(lane.waiting[0]):
             lane.active = lane.waiting.popleft()
             self._transmit(lane.active, now)
+
+    def _waits(self, entry: _Active) -> bool:
+        return self.motion_waits and entry.command.motion
 
     def _transmit(self, active: _Active, now: float) -> None:
         self._send(active.command, min(active.attempts, 255))

@@ -1,21 +1,21 @@
 """The link without its wires: bytes and the time go in, events and bytes come out.
 
-Nothing here opens a socket, sleeps or looks at a clock. The owner calls `receive_data` with what has arrived, `tick`
-every few hundredths of a second, and sends what `data_to_send` gives it, to `destination`. All times are those of the
-service's clock, handed in, and never go back.
+Nothing here opens a socket, sleeps or looks at a clock. The owner calls `receive_data` with what has arrived,
+`tick` every few hundredths of a second, and sends what `data_to_send` gives it, to `destination`. All times
+are those of the service's clock, handed in, and never go back.
 
 What moves the aircraft passes one of two gates, right before it is sent:
 
 * `why_not_command`: the vehicle is heard now, our process has not been standing still, and control is ours
   (see `control`) or an operator has just ordered it;
-* `why_not_reposition`: all that, and the last heartbeat shows the guided mode and armed motors, the vehicle says that
-  it is in the air, and its position is fresh. Repeating a target passes it again.
+* `why_not_reposition`: all that, and the last heartbeat shows the guided mode and armed motors, the vehicle
+  says that it is in the air, and its position is fresh. Repeating a target passes it again.
 """
 
 from __future__ import annotations
 
 import math
-from collections import OrderedDict, deque
+from collections import deque
 from collections.abc import Hashable
 from dataclasses import replace
 
@@ -24,6 +24,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.mavlink import gates
 from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.autopilots.registry import autopilot_for
+from service.mavlink.boot import BootClock
 from service.mavlink.command import Command, CommandBook, result_name, set_message_interval
 from service.mavlink.control import Control
 from service.mavlink.errors import NotPermitted
@@ -45,21 +46,17 @@ from service.mavlink.events import (
     TargetTaken,
     VehicleEvent,
 )
-from service.mavlink.framing import Codec, Framer, Message
+from service.mavlink.framing import Codec, Message, Receiver, own_heartbeat
 from service.mavlink.history import PoseHistory
 from service.mavlink.readiness import Readiness
 from service.mavlink.settings import LinkSettings
 from service.mavlink.streams import Streams, common_streams
 from service.mavlink.target import Step, TargetWatch
-from service.mavlink.telemetry import READERS, Telemetry, stopping_point
+from service.mavlink.telemetry import READERS, Telemetry, after_reboot, heartbeat, stopping_point
 from service.mavlink.texts import TextReader, text_messages
 
 _AUTOPILOT = mavlink.MAV_COMP_ID_AUTOPILOT1
-_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 _BEFORE_PAIRING_SYSTEM = 1
-_MOST_SOURCES = 8
-_REBOOT_BACK_S = 2.0
-_BOOT_WRAP_S = 2.0**32 / 1000.0
 _TEXT_MEMORY_S = 10.0
 _ARMS = (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF)
 
@@ -69,8 +66,8 @@ class LinkCore:
 
     Args:
         settings: rates, limits and time-outs.
-        speaks_first: whether to send heartbeats before a vehicle was heard, so that the peer learns our address
-            (a `udpout` link). Where we only listen, nothing is sent to anybody before that.
+        speaks_first: whether to send heartbeats before a vehicle was heard, so that the peer learns our
+            address (a `udpout` link). Where we only listen, nothing is sent to anybody before that.
     """
 
     def __init__(self, settings: LinkSettings, *, speaks_first: bool = False) -> None:
@@ -86,7 +83,8 @@ class LinkCore:
         self.messages_received = 0
         self._speaks_first = speaks_first
         self._codec = Codec(settings.system_id or _BEFORE_PAIRING_SYSTEM, settings.component_id)
-        self._framers: OrderedDict[Hashable, Framer] = OrderedDict()
+        self._receiver = Receiver(self._codec)
+        self._boot = BootClock()
         self._streams = Streams(())
         self._book = CommandBook(
             self._transmit,
@@ -114,31 +112,25 @@ class LinkCore:
     # ---- what the owner calls
 
     def receive_data(self, data: bytes, now: float, source: Hashable = None) -> list[VehicleEvent]:
-        """Take bytes that arrived from a source (an address, or None where there is only one). Never raises."""
+        """Take bytes that arrived from a source (None where there is only one). Never raises."""
         self._wake(now)
         self.bytes_received += len(data)
-        framer = self._framers.get(source)
-        if framer is None:
-            framer = self._framers[source] = Framer(self._codec)
-            if len(self._framers) > _MOST_SOURCES:
-                self._framers.popitem(last=False)
-        self._framers.move_to_end(source)
-        for message in framer.feed(data, now):
+        for message in self._receiver.feed(data, now, source):
             self._take(message, source, now)
         return self._pop_events()
 
     def tick(self, now: float) -> list[VehicleEvent]:
         """Do what is due by time."""
         self._wake(now)
-        for source, framer in list(self._framers.items()):
-            for message in framer.expire(now):
-                self._take(message, source, now)
+        for source, message in self._receiver.expire(now):
+            self._take(message, source, now)
         if now - self._beat_at >= self.settings.heartbeat_period_s and (self.paired or self._speaks_first):
             self._beat_at = now
-            self._send(_own_heartbeat())
+            self._send(own_heartbeat())
         if self.paired:
             self._check_silence(now)
             self._ask_for_streams(now)
+            self._book.motion_waits = self.why_not_command(now, ordered=True) is not None
             self._done(self._book.tick(now))
             self._push_target(now)
             self._heard_texts(self._texts.tick(now), now)
@@ -193,7 +185,7 @@ class LinkCore:
     # ---- what moves the aircraft
 
     def take_control(self, now: float) -> None:
-        """On an operator's order: the aircraft is ours to move from now on. It must be in the guided mode already.
+        """On an operator's order: the aircraft, in its guided mode already, is ours to move from now on.
 
         Raises:
             NotPermitted: it is not, or it is not heard.
@@ -210,7 +202,8 @@ class LinkCore:
     def release_control(self, reason: str, now: float) -> None:
         """Give control up: nothing that moves the aircraft is sent any more, nor repeated."""
         self._wake(now)
-        self._drop_control(reason, now)
+        self._control.lose(reason)
+        self._stand_down(reason, now)
 
     def reposition(self, lat: float, lon: float, alt_amsl_m: float, now: float) -> Target:
         """Send the aircraft to a place; the next one replaces it.
@@ -228,7 +221,7 @@ class LinkCore:
         return target
 
     def hold(self, now: float) -> Target:
-        """Stop here, in the guided mode: a target where the aircraft can just stop, so that it does not fly back.
+        """Stop here, in the guided mode: at the place where the aircraft can just stop, not behind it.
 
         Raises:
             NotPermitted: as for `reposition`.
@@ -243,7 +236,8 @@ class LinkCore:
         """Send a command; returns the ticket of its CommandDone.
 
         Raises:
-            NotPermitted: it moves the aircraft and may not be sent now, or it arms and that is not allowed at all.
+            NotPermitted: it moves the aircraft and may not be sent now, or it arms and that is not allowed at
+                all.
         """
         self._wake(now)
         if command.number in _ARMS and not self.settings.allow_arming:
@@ -251,10 +245,11 @@ class LinkCore:
         reason = self.why_not_command(now, ordered=ordered or not command.motion)
         if reason is not None:
             raise NotPermitted(f"{command.name} was not sent: {reason}")
+        self._book.motion_waits = False
         return self._book.submit(command, now)
 
     def status_text(self, text: str, severity: int) -> bool:
-        """Say something to the pilot (STATUSTEXT, see `texts.text_messages`); False before a vehicle is heard."""
+        """Say something to the pilot (STATUSTEXT, see `text_messages`); False before a vehicle is heard."""
         if not self.paired:
             return False
         self._text_id = self._text_id % 0xFFFF + 1
@@ -280,7 +275,8 @@ class LinkCore:
                 return  # somebody else speaks in the vehicle's name while it is still heard
             self.destination = source
         self._heard_at = now
-        self._watch_boot_time(message, now)
+        if self._boot.read(message):
+            self._rebooted(now)
         self._streams.on_message(message.get_msgId(), now)
         if name == "HEARTBEAT":
             self._heartbeat(message, now)
@@ -305,19 +301,10 @@ class LinkCore:
         self._heard_at = now
         self._codec.system_id = system
         self._streams = Streams((*common_streams(self.settings), *autopilot.extra_streams))
-        mode = autopilot.mode_name(message.base_mode, message.custom_mode)
-        armed = bool(message.base_mode & _ARMED)
-        self.telemetry = replace(
-            self.telemetry,
-            heartbeat_time=now,
-            system_id=system,
-            autopilot=autopilot.name,
-            mode=mode,
-            guided=mode == autopilot.guided_mode,
-            armed=armed,
-            system_status=message.system_status,
+        self.telemetry = t = heartbeat(
+            replace(self.telemetry, system_id=system, autopilot=autopilot.name), message, autopilot, now
         )
-        self._events.append(Paired(now, system, autopilot.name, mode, armed))
+        self._events.append(Paired(now, system, autopilot.name, t.mode, t.armed))
 
     def _heartbeat(self, message: Message, now: float) -> None:
         autopilot, before = self.autopilot, self.telemetry
@@ -325,39 +312,29 @@ class LinkCore:
         same = autopilot_for(message.autopilot, message.type)
         if isinstance(same, str) or same.name != autopilot.name:
             return
-        mode = autopilot.mode_name(message.base_mode, message.custom_mode)
-        armed = bool(message.base_mode & _ARMED)
-        self.telemetry = replace(
-            before,
-            heartbeat_time=now,
-            mode=mode,
-            guided=mode == autopilot.guided_mode,
-            armed=armed,
-            system_status=message.system_status,
-            link_lost=False,
-        )
+        self.telemetry = after = heartbeat(before, message, autopilot, now)
         if before.link_lost:
             self._events.append(LinkBack(now, now - before.heartbeat_time))
             self._streams.start_over()
-        if mode != before.mode:
+        if after.mode != before.mode:
             self._mode_changed(autopilot, before.mode, now)
-        self._done(self._book.on_mode(mode, now))
-        if armed != before.armed:
-            commanded = self._control.on_armed(armed, now)
-            if not armed:
-                self._drop_control(self._control.reason, now)
-            self._events.append(ArmedChanged(now, armed, commanded))
+        self._done(self._book.on_mode(after.mode, now))
+        if after.armed != before.armed:
+            commanded = self._control.on_armed(after.armed, now)
+            if not after.armed:
+                self._stand_down("the aircraft has disarmed", now)
+            self._events.append(ArmedChanged(now, after.armed, commanded))
         self._show_control()
 
     def _mode_changed(self, autopilot: Autopilot, previous: str, now: float) -> None:
         t = self.telemetry
-        commanded = self._control.on_mode(autopilot, previous, t.mode, armed=t.armed, now=now)
+        commanded = self._control.on_mode(autopilot, previous, t, now)
         texts = [text.text for text in self.recent_texts(now - _TEXT_MEMORY_S)]
         failsafe = not commanded and autopilot.looks_like_failsafe(t.mode, t.system_status, texts)
         kind = autopilot.mode_kind(t.mode)
         self._events.append(ModeChanged(now, t.mode, previous, kind, t.guided, commanded, failsafe))
         if not commanded:
-            self._drop_control(f"the mode was changed to {t.mode} and not by us", now)
+            self._stand_down(f"the mode was changed to {t.mode} and not by us", now)
         elif not t.guided:
             self._watch.clear()
 
@@ -378,7 +355,8 @@ class LinkCore:
 
     def _read(self, name: str, message: Message, now: float) -> None:
         before = self.telemetry
-        self.telemetry = after = READERS[name](before, message, now)
+        after = replace(READERS[name](before, message, now), boot_time_s=self._boot.seconds)
+        self.telemetry = after
         if name == "GLOBAL_POSITION_INT":
             if after.position_time == now:
                 self.history.record(after)
@@ -408,37 +386,14 @@ class LinkCore:
             if self.autopilot and self.autopilot.says_not_ready(text.text):
                 self._readiness.on_complaint(now)
 
-    def _watch_boot_time(self, message: Message, now: float) -> None:
-        stamp_ms = getattr(message, "time_boot_ms", 0)
-        if not stamp_ms:
-            return
-        boot, last = stamp_ms / 1000.0, self.telemetry.boot_time_s
-        if last is not None and boot < last:
-            back = last - boot
-            if back < _REBOOT_BACK_S:
-                return  # a datagram overtaken by another
-            if back < _BOOT_WRAP_S - 60.0:
-                self._rebooted(now)
-        self.telemetry = replace(self.telemetry, boot_time_s=boot)
-
     def _rebooted(self, now: float) -> None:
-        self._drop_control("the vehicle has rebooted", now)
+        self._control.lose("the vehicle has rebooted")
+        self._stand_down("the vehicle has rebooted", now)
         self._done(self._book.cancel("the vehicle has rebooted", now))
         self._streams.start_over()
         self.history.clear()
         self._readiness.forget()
-        t = self.telemetry
-        self.telemetry = Telemetry(
-            heartbeat_time=t.heartbeat_time,
-            system_id=t.system_id,
-            autopilot=t.autopilot,
-            mode=t.mode,
-            guided=t.guided,
-            armed=t.armed,
-            system_status=t.system_status,
-            link_lost=t.link_lost,
-        )
-        self._show_control()
+        self.telemetry = after_reboot(self.telemetry)
         self._events.append(Rebooted(now))
 
     # ---- what is due by time
@@ -505,8 +460,8 @@ class LinkCore:
         if not self._watch.taken:
             self._give_up_target(reason, now)
 
-    def _drop_control(self, reason: str, now: float) -> None:
-        self._control.lose(reason)
+    def _stand_down(self, reason: str, now: float) -> None:
+        """Control is lost: nothing that was under way is sent again."""
         self._done(self._book.cancel(reason, now, only_motion=True))
         self._give_up_target(reason, now)
         self._show_control()
@@ -521,6 +476,8 @@ class LinkCore:
         assert now is not None
         if command.goal_mode is not None:
             self._control.expect(command.goal_mode, now + self.settings.mode_window_s)
+        if command.height_m is not None:
+            self._control.climb_to(command.height_m)
         if command.number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             self._control.expect_armed(True, now + self.settings.mode_window_s)
         self._send(command.message(self.telemetry.system_id, _AUTOPILOT, confirmation))
@@ -536,9 +493,3 @@ class LinkCore:
     def _pop_events(self) -> list[VehicleEvent]:
         events, self._events = self._events, []
         return events
-
-
-def _own_heartbeat() -> Message:
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
-    )

@@ -59,7 +59,7 @@ class Paired:
 
 @dataclass(frozen=True, slots=True)
 class ModeChanged:
-    """The heartbeat shows another mode. `commanded` is False when neither we nor our last command made it so."""
+    """The heartbeat shows another mode; `commanded` is False when no command of ours made it so."""
 
     time: float
     mode: str

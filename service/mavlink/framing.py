@@ -1,9 +1,9 @@
 """Bytes to MAVLink messages and back, on pymavlink's generated dialect.
 
-pymavlink's own stream parser believes the length byte of anything that begins with a start byte: one stray 0xFD
-in front of a good frame costs that frame too. This one takes a start byte as a guess. If the checksum of the frame
-that would begin there is wrong, it goes on with the very next byte, so noise never costs a good frame, and a
-guess that stays incomplete for too long is given up as well.
+pymavlink's own stream parser believes the length byte of anything that begins with a start byte: one stray
+0xFD in front of a good frame costs that frame too. This one takes a start byte as a guess. If the checksum of
+the frame that would begin there is wrong, it goes on with the very next byte, so noise never costs a good
+frame, and a guess that stays incomplete for too long is given up as well.
 
 Signing has its place here: `Codec` owns the one `MAVLink` object that checks and makes signatures.
 """
@@ -11,6 +11,8 @@ Signing has its place here: `Codec` owns the one `MAVLink` object that checks an
 from __future__ import annotations
 
 import struct
+from collections import OrderedDict
+from collections.abc import Hashable
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -21,6 +23,7 @@ Message = Any
 _V1, _V2 = 0xFE, 0xFD
 _V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE = 8, 12, 13
 _PATIENCE_S = 0.5
+_MOST_SOURCES = 8
 
 
 class Codec:
@@ -104,14 +107,43 @@ class Framer:
         return messages
 
     def _plausible(self, message: Message, end: int) -> bool:
-        """The checksum of an unknown message cannot be checked: believe its length only if a frame follows it."""
+        """The checksum of an unknown message cannot be checked: its length is, by what follows."""
         if message.get_msgId() >= 0:
             return True
         return end == len(self._buffer) or self._buffer[end] in (_V1, _V2)
 
 
+class Receiver:
+    """One framer for each of the last few sources heard."""
+
+    def __init__(self, codec: Codec) -> None:
+        self._codec = codec
+        self._framers: OrderedDict[Hashable, Framer] = OrderedDict()
+
+    def feed(self, data: bytes, now: float, source: Hashable) -> list[Message]:
+        """Take bytes from a source; returns the messages completed by them."""
+        framer = self._framers.get(source)
+        if framer is None:
+            framer = self._framers[source] = Framer(self._codec)
+            if len(self._framers) > _MOST_SOURCES:
+                self._framers.popitem(last=False)
+        self._framers.move_to_end(source)
+        return framer.feed(data, now)
+
+    def expire(self, now: float) -> list[tuple[Hashable, Message]]:
+        """The messages that were hidden behind frames which never became complete, with their sources."""
+        return [(source, m) for source, framer in self._framers.items() for m in framer.expire(now)]
+
+
+def own_heartbeat() -> Message:
+    """HEARTBEAT of an onboard computer."""
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+    )
+
+
 def _frame_length(buffer: bytearray, at: int) -> int | None:
-    """Length of the frame that would begin here; None if too little is there to tell, 0 if it cannot be one."""
+    """Length of the frame that would begin here; None if that cannot be told yet, 0 if none can."""
     if len(buffer) - at < 3:
         return None
     if buffer[at] == _V1:

@@ -28,8 +28,8 @@ def why_not_command(
     """Why nothing that moves the aircraft may be sent now.
 
     Args:
-        stalled_at: when our process last woke from standing still. What was received at that moment had been waiting
-            in a buffer and may be as old as the pause, so a later heartbeat is wanted.
+        stalled_at: when our process last woke from standing still. What was received at that moment had been
+            waiting in a buffer and may be as old as the pause, so a later heartbeat is wanted.
         ordered: an operator has just ordered it, so control need not be ours yet.
     """
     if autopilot is None:

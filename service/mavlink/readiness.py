@@ -1,8 +1,8 @@
 """When the vehicle can be armed.
 
-The sign is MAV_SYS_STATUS_PREARM_CHECK in SYS_STATUS.health (PX4 sets it in health only). ArduCopter was seen to report
-it healthy 18 seconds before it had a position, so it is believed only once it has stayed set for a while, no
-text has said otherwise in that time, and position, home and a 3D fix are there.
+The sign is MAV_SYS_STATUS_PREARM_CHECK in SYS_STATUS.health (PX4 sets it in health only). ArduCopter was seen
+to report it healthy 18 seconds before it had a position, so it is believed only once it has stayed set for a
+while, no text has said otherwise in that time, and position, home and a 3D fix are there.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Which messages are asked for, and asked for again when they do not come.
 
-PX4 streams most of this unasked, ArduCopter nothing but a heartbeat. Both obey MAV_CMD_SET_MESSAGE_INTERVAL, forget
-it when they reboot, and another ground station may ask for other rates: so a stream is judged by its arrival.
+PX4 streams most of this unasked, ArduCopter nothing but a heartbeat. Both obey MAV_CMD_SET_MESSAGE_INTERVAL
+and forget it when they reboot, so a stream is judged by its arrival.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Streams:
                 wanted.patience_s = _FIRST_PATIENCE_S
 
     def due(self, now: float) -> list[Stream]:
-        """The streams to ask for now: never asked for, or silent for too long (asked more and more rarely)."""
+        """The streams to ask for now: new, or silent for too long (then more and more rarely)."""
         due = []
         unanswered = set(self._tickets.values())
         for message_id, wanted in self._wanted.items():
@@ -82,7 +82,7 @@ class Streams:
         self._tickets[ticket] = stream.message_id
 
     def on_answer(self, ticket: int, *, refused: bool) -> bool:
-        """A command has ended; returns whether it was for a stream. A refused optional one is not asked for again."""
+        """A command has ended; returns whether it was for a stream. An optional one may be refused."""
         message_id = self._tickets.pop(ticket, None)
         wanted = None if message_id is None else self._wanted.get(message_id)
         if wanted is not None and refused and wanted.stream.optional:

@@ -1,7 +1,8 @@
 """Watches whether the autopilot flies to the target it was given.
 
 The acknowledgement of DO_REPOSITION is no judge (PX4 answers UNSUPPORTED and flies there), so the judge is
-POSITION_TARGET_GLOBAL_INT, which both autopilots send and which names the final target at once. One target at a time:
+POSITION_TARGET_GLOBAL_INT, which both autopilots send and which names the final target at once. One target at
+a time:
 
     start ──► WATCHED ── named ──► TAKEN ── another one named twice ──► (TargetReplaced) ──► idle
                  │  ▲

@@ -1,7 +1,8 @@
 """What the vehicle has last said about itself, as one immutable value.
 
-`READERS` maps a MAVLink message to the function that takes it over. A field that the vehicle has not sent, or has sent as
-"unknown" (each message has its own way to say so), is None, or NaN where the type is a plain float.
+`READERS` maps a MAVLink message to the function that takes it over. A field that the vehicle has not sent, or
+has sent as "unknown" (each message has its own way to say so), is None, or NaN where the type is a plain
+float.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.events import Target
 from service.mavlink.framing import Message
 
@@ -128,6 +130,36 @@ class Telemetry:
 def valid_place(lat: float, lon: float) -> bool:
     """Whether this is a place on earth, and not the 0/0 that autopilots send before they know better."""
     return abs(lat) <= 90.0 and abs(lon) <= 180.0 and not (lat == 0.0 and lon == 0.0)
+
+
+def heartbeat(t: Telemetry, m: Message, autopilot: Autopilot, now: float) -> Telemetry:
+    """Take over the vehicle's HEARTBEAT: the one judge of its mode and of whether it is armed."""
+    mode = autopilot.mode_name(m.base_mode, m.custom_mode)
+    return replace(
+        t,
+        heartbeat_time=now,
+        mode=mode,
+        guided=mode == autopilot.guided_mode,
+        armed=bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED),
+        system_status=m.system_status,
+        link_lost=False,
+    )
+
+
+def after_reboot(t: Telemetry) -> Telemetry:
+    """What is still known of a vehicle that has rebooted: what its heartbeats say, and whose it is."""
+    return Telemetry(
+        heartbeat_time=t.heartbeat_time,
+        system_id=t.system_id,
+        autopilot=t.autopilot,
+        mode=t.mode,
+        guided=t.guided,
+        armed=t.armed,
+        system_status=t.system_status,
+        link_lost=t.link_lost,
+        in_control=t.in_control,
+        control_reason=t.control_reason,
+    )
 
 
 def stopping_point(t: Telemetry, distance_m: float) -> Target:

@@ -14,7 +14,7 @@ _MOST_OPEN = 8
 
 
 class TextReader:
-    """Puts the vehicle's chunked texts together; a text whose end never comes is given out as far as it got."""
+    """Puts chunked texts together; a text whose end never comes is given out as far as it got."""
 
     def __init__(self) -> None:
         self._open: dict[int, tuple[float, int, dict[int, str]]] = {}

@@ -1,8 +1,8 @@
 """The wires: sockets and serial ports that never block and never keep anything for later.
 
-`receive` gives everything that is there, so that the last heartbeat is known before the next decision. `send` hands a
-frame to the kernel now or not at all: a waypoint that waited in a queue until a broken link came back would be a
-stale order. A stream that breaks is opened again by `run`, for ever; a UDP socket never breaks.
+`receive` gives everything that is there, so that the last heartbeat is known before the next decision. `send`
+hands a frame to the kernel now or not at all: a waypoint that waited in a queue until a broken link came back
+would be a stale order. A stream that breaks is opened again by `run`, for ever; a UDP socket never breaks.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import errno
 import os
+import select
 import socket
 import time
 from abc import ABC, abstractmethod
@@ -48,7 +49,7 @@ class Transport(ABC):
 
     @abstractmethod
     async def run(self, on_readable: Callable[[], None]) -> None:
-        """Keep the wire up until cancelled; calls `on_readable` whenever there may be something to receive."""
+        """Keep the wire up until cancelled; calls `on_readable` when there may be something to receive."""
 
     @abstractmethod
     def receive(self) -> list[Chunk]:
@@ -141,7 +142,6 @@ class StreamTransport(Transport):
         self._fd: int | None = None
         self._rest = b""
         self._broken = asyncio.Event()
-        self._serial_number = 0
         self._last_read = 0.0
 
     @abstractmethod
@@ -161,7 +161,6 @@ class StreamTransport(Transport):
                 await asyncio.sleep(_AGAIN_S)
                 continue
             self._fd, self._rest, self._last_read = fd, b"", time.monotonic()
-            self._serial_number += 1
             self._broken.clear()
             loop.add_reader(fd, on_readable)
             try:
@@ -182,13 +181,14 @@ class StreamTransport(Transport):
             except BlockingIOError:
                 break
             except OSError:
-                data = b""
+                self._broken.set()
+                break
             if not data:
-                if not self._idle_at_end():
+                if not self._only_empty():
                     self._broken.set()
                 break
             self._last_read = time.monotonic()
-            chunks.append((data, self._serial_number))
+            chunks.append((data, None))
         return chunks
 
     def send(self, frame: bytes, to: Hashable) -> bool:
@@ -207,8 +207,8 @@ class StreamTransport(Transport):
             return False
         return True
 
-    def _idle_at_end(self) -> bool:
-        """Whether an empty read only means that there is nothing now."""
+    def _only_empty(self) -> bool:
+        """Whether a read of nothing means that there is nothing now, and not the end of the stream."""
         return False
 
     def close(self) -> None:
@@ -294,13 +294,24 @@ class TcpServerTransport(StreamTransport):
         except OSError:
             return
         client.setblocking(False)
-        busy = self._fd is not None and time.monotonic() - self._last_read < _CLIENT_SILENT_S
+        silent_s = time.monotonic() - self._last_read
+        busy = self._fd is not None and silent_s < _CLIENT_SILENT_S and not self._client_has_gone()
         if busy or self._accepted.full():
             client.close()
             return
         self._accepted.put_nowait(client)
         if self._fd is not None:
             self._broken.set()
+
+    def _client_has_gone(self) -> bool:
+        """Whether the client has closed its end, though that was not read yet."""
+        assert self._socket is not None
+        try:
+            return not self._socket.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
 
     async def _connect(self) -> int:
         client = await self._accepted.get()
@@ -349,6 +360,12 @@ class SerialTransport(StreamTransport):
                 f"the link {self.url} needs pyserial, which is not installed: pip install 'roisearch[serial]'"
             ) from error
         return serial.Serial(self.url.address, self.url.number, timeout=0, exclusive=True)
+
+    def _only_empty(self) -> bool:
+        """A port that has been pulled out keeps on saying that it can be read."""
+        poll = select.poll()
+        poll.register(self._port.fileno(), select.POLLIN)
+        return not poll.poll(0)
 
     def _disconnect(self) -> None:
         if self._port is not None:

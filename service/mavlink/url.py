@@ -16,7 +16,10 @@ from enum import StrEnum
 
 from service.errors import BadInput
 
-_EXAMPLES = "udpin://0.0.0.0:14540, udpout://HOST:PORT, tcpin://HOST:PORT, tcpout://HOST:PORT or serial:///dev/ttyACM0:921600"
+_EXAMPLES = (
+    "udpin://0.0.0.0:14540, udpout://HOST:PORT, tcpin://HOST:PORT, tcpout://HOST:PORT "
+    "or serial:///dev/ttyACM0:921600"
+)
 
 
 class LinkKind(StrEnum):

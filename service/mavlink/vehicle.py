@@ -7,9 +7,9 @@
         async for event in vehicle.events():
             ...
 
-Waiting is done here, deciding in the core. Before anything that moves the aircraft is sent, everything that the wire
-has is read first, so that the decision is taken on the last heartbeat there is, not on the last one that the event loop
-got round to.
+Waiting is done here, deciding in the core. Before anything that moves the aircraft is sent, everything that
+the wire has is read first, so that the decision is taken on the last heartbeat there is, not on the last one
+that the event loop got round to.
 """
 
 from __future__ import annotations
@@ -154,8 +154,8 @@ class Vehicle:
         core, where = self._core, self._transport.address
         if core.autopilot is not None:
             raise NoVehicle(
-                f"system {core.telemetry.system_id} ({core.autopilot.title}) is heard on {where} but has sent no "
-                f"position in {timeout_s:g} s; it may have no GPS fix yet"
+                f"system {core.telemetry.system_id} ({core.autopilot.title}) is heard on {where} "
+                f"but has sent no position in {timeout_s:g} s; it may have no GPS fix yet"
             )
         if core.rejected:
             raise NoVehicle(f"the only autopilot heard on {where} cannot be flown: {core.rejected}")
@@ -184,9 +184,8 @@ class Vehicle:
                 if not there
             ]
             lacks = ", ".join(missing) or "a pre-arm check that stays healthy"
-            raise CommandFailed(
-                f"the vehicle is not ready to arm after {timeout_s:g} s: it lacks {lacks}{self._complaint(since)}"
-            )
+            lacks += self._complaint(since)
+            raise CommandFailed(f"the vehicle is not ready to arm after {timeout_s:g} s: it lacks {lacks}")
 
     # ---- orders of an operator
 
@@ -312,9 +311,8 @@ class Vehicle:
         since = self._clock.now()
         outcome = await self._ask(self._need_autopilot().change_speed(speed_mps))
         if not isinstance(outcome, Accepted):
-            raise CommandFailed(
-                f"the vehicle did not take a speed of {speed_mps:g} m/s: {await self._explain(outcome, since)}"
-            )
+            why = await self._explain(outcome, since)
+            raise CommandFailed(f"the vehicle did not take a speed of {speed_mps:g} m/s: {why}")
 
     def release_control(self, reason: str) -> None:
         """Give control up until `enter_guided`: nothing that moves the aircraft is sent any more."""
@@ -331,8 +329,9 @@ class Vehicle:
 
     def _pump(self) -> None:
         """Take in everything that the wire has, then send what that caused."""
-        for data, source in self._transport.receive():
-            self._publish(self._core.receive_data(data, self._clock.now(), source))
+        chunks, now = self._transport.receive(), self._clock.now()
+        for data, source in chunks:  # one time for all: what waited in the buffer is as old as its oldest
+            self._publish(self._core.receive_data(data, now, source))
         self._flush()
         self._announce()
 

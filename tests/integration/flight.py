@@ -81,7 +81,8 @@ class Process:
         with self._more:
             while (match := re.search(pattern, self.said)) is None:
                 left = deadline - time.monotonic()
-                assert left > 0 and self.process.poll() is None, f"no '{pattern}' in:\n{self.said}"
+                waiting = left > 0 and self.process.poll() is None
+                assert waiting, f"no '{pattern}' in:\n{self.said}"
                 self._more.wait(min(left, 1.0))
             return match
 

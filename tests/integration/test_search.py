@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -158,3 +160,26 @@ def test_the_journal_of_a_run_is_complete(tmp_path: Path) -> None:
     assert len(sent) >= report["waypoints"] > 0
     with sqlite3.connect(path) as database:
         assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+
+
+def test_ctrl_c_flies_the_aircraft_home(tmp_path: Path) -> None:
+    words = service_words(write_area(tmp_path), tmp_path / "runs", "--speedup", "20")
+    with running(*words) as service:
+        service.wait_for("→ SEARCHING")
+        service.process.send_signal(signal.SIGINT)
+        service.wait_for("→ RETURNING")
+        assert service.exit_code() == 4
+    assert "RETURNING → DONE" in service.said
+
+
+def test_a_mock_that_dies_ends_the_run(tmp_path: Path) -> None:
+    words = service_words(write_area(tmp_path), tmp_path / "runs", "--speedup", "20")
+    with running(*words) as service:
+        service.wait_for("→ SEARCHING")
+        children = subprocess.run(
+            ["pgrep", "-P", str(service.process.pid), "-f", "sim autopilot"], capture_output=True, text=True
+        )
+        os.kill(int(children.stdout), signal.SIGKILL)
+        assert service.exit_code() == 4
+    assert "the mock autopilot has ended" in service.said
+    assert only_report(tmp_path / "runs")["outcome"] == "aborted"

@@ -69,6 +69,6 @@ def test_every_known_key_can_be_set_from_the_environment() -> None:
 def test_only_a_simulator_may_run_faster_than_real_time() -> None:
     assert read_settings(None, environment={}).speedup == 20.0
     assert read_settings(None, environment={}, flags={"link.connect": "udpin://0.0.0.0:14540"}).speedup == 1.0
+    flags = {"link.connect": "serial:///dev/ttyACM0:921600", "link.speedup": 5.0}
     with pytest.raises(BadInput, match="real aircraft"):
-        flags = {"link.connect": "serial:///dev/ttyACM0:921600", "link.speedup": 5.0}
         read_settings(None, environment={}, flags=flags)

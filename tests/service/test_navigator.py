@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from service.navigator import HEADING, Navigator, heading_between, straight_part
 
 
-def navigator() -> Navigator:
-    n = Navigator(cell_m=25.0, deceleration_mps2=2.0, corner_m=5.0)
+def navigator(speed_mps: float = 8.0) -> Navigator:
+    n = Navigator(cell_m=25.0, speed_mps=speed_mps, deceleration_mps2=2.0, corner_m=5.0)
     n.begin((10, 10), "east")
     return n
 
@@ -22,6 +22,13 @@ def test_a_path_straight_on_is_sent_before_the_aircraft_brakes() -> None:
     assert n.waypoint == (10, 11)
 
 
+def test_the_next_decision_is_made_before_a_fast_aircraft_would_brake() -> None:
+    n = navigator(speed_mps=8.0)
+    assert n.wants_decision(remaining_m=n.lead_m, thinking_s=0.0)
+    assert n.wants_decision(remaining_m=n.lead_m + 12.0, thinking_s=1.0)
+    assert not n.wants_decision(remaining_m=n.lead_m + 12.0, thinking_s=0.0)
+
+
 def test_a_turn_waits_until_the_corner() -> None:
     n = navigator()
     n.decide([(9, 10), (8, 10)])
@@ -31,7 +38,7 @@ def test_a_turn_waits_until_the_corner() -> None:
 
 
 def test_cells_in_one_line_become_one_target_when_the_aircraft_is_fast() -> None:
-    n = navigator()
+    n = navigator(speed_mps=14.0)
     n.decide([(10, 11), (10, 12), (10, 13), (10, 14), (11, 14)])
     assert n.due(remaining_m=2.0, speed_mps=14.0) == (10, 13)
     assert n.ahead == ((10, 10), (10, 11), (10, 12), (10, 13))
@@ -44,7 +51,7 @@ def test_a_hit_makes_the_next_decision_due_at_once_wherever_the_waypoint_is() ->
     n.decide([(10, 11)])
     n.interrupt((10, 8), "east")
     assert not n.decided
-    assert n.wants_decision(remaining_m=500.0, speed_mps=8.0, thinking_s=0.0)
+    assert n.wants_decision(remaining_m=500.0, thinking_s=0.0)
     n.decide([(10, 7)])
     assert n.due(remaining_m=500.0, speed_mps=8.0) == (10, 7)
 
@@ -70,7 +77,7 @@ def test_what_is_sent_is_always_a_straight_beginning_of_the_path(
     for row, col in steps:
         here = (here[0] + row, here[1] + col)
         path.append(here)
-    n = Navigator(cell_m=25.0, deceleration_mps2=1.5, corner_m=5.0)
+    n = Navigator(cell_m=25.0, speed_mps=8.0, deceleration_mps2=1.5, corner_m=5.0)
     n.interrupt((50, 50), "north")
     n.decide(path)
     target = n.due(remaining, speed)

@@ -1,7 +1,7 @@
 """ArduCopter (seen on 4.7.0-dev).
 
-`custom_mode` is the mode's number. The guided mode is GUIDED; take-off happens in it and only in it, to a height above
-home. It acknowledges once and truthfully.
+`custom_mode` is the mode's number. The guided mode is GUIDED; take-off happens in it and only in it, to a
+height above home. It acknowledges once and truthfully.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _MODES = {
     28: "TURTLE",
 }
 _NUMBERS = {name: number for number, name in _MODES.items()}
-_PILOTED = "STABILIZE ACRO ALT_HOLD LOITER DRIFT SPORT FLIP AUTOTUNE POSHOLD FLOWHOLD ZIGZAG TURTLE".split()
+_PILOTED = (0, 1, 2, 5, 11, 13, 14, 15, 16, 22, 24, 28)
 _CUSTOM_MODE_ENABLED = 1.0
 
 
@@ -64,7 +64,7 @@ class ArduCopter(Autopilot):
         "SMART_RTL": ModeKind.RETURN,
         "AUTO_RTL": ModeKind.RETURN,
         "LAND": ModeKind.LAND,
-        **dict.fromkeys(_PILOTED, ModeKind.PILOT),
+        **{_MODES[number]: ModeKind.PILOT for number in _PILOTED},
     }
     deceleration_mps2 = 2.1
     extra_streams = (
@@ -86,9 +86,10 @@ class ArduCopter(Autopilot):
     def take_off(self, height_m: float, home_alt_amsl_m: float) -> Command:
         """The altitude is above home: given an AMSL one, it climbs towards that."""
         params = (0.0, 0.0, 0.0, math.nan, 0.0, 0.0, height_m)
-        return Command(mavlink.MAV_CMD_NAV_TAKEOFF, params, motion=True, label=f"{height_m:g} m")
+        number = mavlink.MAV_CMD_NAV_TAKEOFF
+        return Command(number, params, motion=True, label=f"{height_m:g} m", height_m=height_m)
 
-    def follows(self, previous: str, mode: str, *, armed: bool) -> bool:
+    def follows(self, previous: str, mode: str, *, armed: bool, climbed: bool) -> bool:
         """Nothing: it stays in GUIDED after a take-off and in RTL or LAND after a landing."""
         return False
 

@@ -1,7 +1,7 @@
 """What the service has to know about an autopilot that MAVLink itself does not say.
 
-One interface, two implementations (`px4`, `ardupilot`). Where a method has a body here, both real autopilots were
-seen to behave that way.
+One interface, two implementations (`px4`, `ardupilot`). Where a method has a body here, both real autopilots
+were seen to behave that way.
 """
 
 from __future__ import annotations
@@ -63,8 +63,13 @@ class Autopilot(ABC):
         """MAV_CMD_NAV_TAKEOFF to a height above home."""
 
     @abstractmethod
-    def follows(self, previous: str, mode: str, *, armed: bool) -> bool:
-        """Whether `mode` comes by itself after `previous`, when we had commanded `previous`."""
+    def follows(self, previous: str, mode: str, *, armed: bool, climbed: bool) -> bool:
+        """Whether `mode` comes by itself after `previous`, when we had commanded `previous`.
+
+        Args:
+            armed: it is armed now.
+            climbed: it is as high as the take-off was to go.
+        """
 
     @abstractmethod
     def refuses_reposition(self, result: int) -> bool:
@@ -95,9 +100,9 @@ class Autopilot(ABC):
     def reposition(self, target: Target, system: int, component: int) -> Message:
         """MAV_CMD_DO_REPOSITION as COMMAND_INT, frame GLOBAL with AMSL altitude, and never a mode change.
 
-        It is the one form that both understand. param2 = 0 leaves out MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: in the
-        pilot's mode, or on the way home, the aircraft then neither moves nor changes its mode. Yaw NaN turns the nose
-        to the target.
+        It is the one form that both understand. param2 = 0 leaves out MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: in
+        the pilot's mode, or on the way home, the aircraft then neither moves nor changes its mode. Yaw NaN
+        turns the nose to the target.
         """
         return mavlink.MAVLink_command_int_message(
             system,

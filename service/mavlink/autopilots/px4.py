@@ -1,8 +1,8 @@
 """PX4 multicopters (seen on 1.16).
 
 `custom_mode` carries the main mode in bits 16 to 23 and the sub-mode in bits 24 to 31. The guided mode is
-AUTO_LOITER, "Hold" on a ground station. Its acknowledgements are no judge: every DO_SET_MODE is acknowledged twice, and
-a reposition without the change-mode flag gets UNSUPPORTED and is flown all the same.
+AUTO_LOITER, "Hold" on a ground station. Its acknowledgements are no judge: every DO_SET_MODE is acknowledged
+twice, and a reposition without the change-mode flag gets UNSUPPORTED and is flown all the same.
 """
 
 from __future__ import annotations
@@ -78,17 +78,19 @@ class PX4(Autopilot):
         return Command(number, params, motion=True, goal_mode=mode, acked_twice=True, label=mode)
 
     def take_off(self, height_m: float, home_alt_amsl_m: float) -> Command:
-        """The altitude is AMSL: given 20 where the ground is at 489 m, PX4 accepts and stays on the ground."""
+        """The altitude is AMSL: given 20 where the ground is at 489 m, PX4 accepts and stays down."""
         params = (math.nan, 0.0, 0.0, math.nan, math.nan, math.nan, home_alt_amsl_m + height_m)
         number = mavlink.MAV_CMD_NAV_TAKEOFF
-        return Command(number, params, motion=True, goal_mode=self.takeoff_mode, label=f"{height_m:g} m")
+        label = f"{height_m:g} m"
+        goal = self.takeoff_mode
+        return Command(number, params, motion=True, goal_mode=goal, label=label, height_m=height_m)
 
-    def follows(self, previous: str, mode: str, *, armed: bool) -> bool:
+    def follows(self, previous: str, mode: str, *, armed: bool, climbed: bool) -> bool:
         """After a take-off it holds; after a landing it goes back to Hold once it has disarmed."""
         if mode != self.guided_mode:
             return False
         if previous == self.takeoff_mode:
-            return True
+            return climbed
         return self.mode_kind(previous) in (ModeKind.RETURN, ModeKind.LAND) and not armed
 
     def refuses_reposition(self, result: int) -> bool:

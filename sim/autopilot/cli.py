@@ -1,0 +1,118 @@
+"""`roisearch-sim autopilot`: one mock autopilot as a process of its own."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import signal
+import sys
+from collections.abc import Callable
+
+from sim.autopilot.address import Address
+from sim.autopilot.core import FIRMWARES, Autopilot
+from sim.autopilot.settings import Settings
+from sim.autopilot.transport import Driver, Mock
+
+_DEFAULTS = Settings()
+
+
+def _numbers(count: int) -> Callable[[str], tuple[float, ...]]:
+    def read(text: str) -> tuple[float, ...]:
+        parts = text.split(",")
+        if len(parts) != count:
+            raise argparse.ArgumentTypeError(f"'{text}' should be {count} numbers separated by commas")
+        try:
+            return tuple(float(each) for each in parts)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"'{text}' should be {count} numbers") from None
+
+    return read
+
+
+def _address(text: str) -> Address:
+    try:
+        return Address.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser(
+        prog="roisearch-sim autopilot", description="A mock PX4 or ArduPilot multicopter on a real socket."
+    )
+    p.add_argument("--flavor", choices=sorted(FIRMWARES), default="px4")
+    p.add_argument(
+        "--listen",
+        action="append",
+        type=_address,
+        metavar="URL",
+        help="udpin://HOST:PORT or tcpin://HOST:PORT (port 0: a free one), udpout://HOST:PORT; repeatable",
+    )
+    p.add_argument("--home", type=_numbers(3), default=_DEFAULTS.home, metavar="LAT,LON,ALT")
+    p.add_argument("--heading", type=float, default=0.0, help="degrees at boot")
+    p.add_argument("--speedup", type=float, default=1.0, help="times faster than the wall clock, up to 100")
+    p.add_argument("--sysid", type=int, default=1)
+    p.add_argument("--seed", type=int, default=0)
+    p.add_argument("--ready-after", type=float, default=_DEFAULTS.ready_after_s, help="seconds from boot")
+    p.add_argument(
+        "--endurance", type=float, default=_DEFAULTS.endurance_s / 60.0, help="minutes of hovering"
+    )
+    p.add_argument(
+        "--wind", type=_numbers(2), default=(0.0, 0.0), metavar="NORTH,EAST", help="m/s of the air"
+    )
+    p.add_argument("--gust", type=float, default=0.0, help="m/s, standard deviation of the gusts")
+    return p
+
+
+def settings_of(args: argparse.Namespace) -> Settings:
+    """The settings the command line asks for."""
+    return Settings(
+        flavor=args.flavor,
+        home=args.home,
+        sysid=args.sysid,
+        seed=args.seed,
+        heading_deg=args.heading,
+        speedup=args.speedup,
+        ready_after_s=args.ready_after,
+        endurance_s=args.endurance * 60.0,
+        wind_mps=args.wind,
+        gust_mps=args.gust,
+    )
+
+
+async def _serve(settings: Settings, listen: list[Address]) -> int:
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stop.set)
+    mock = Mock(Autopilot(settings))
+    try:
+        for address in listen:
+            try:
+                bound = await mock.listen(address)
+            except OSError as error:
+                print(
+                    f"roisearch-sim autopilot: cannot listen on {address}: {error.strerror}", file=sys.stderr
+                )
+                return 2
+            print(f"listening on {bound}", flush=True)
+        async with asyncio.TaskGroup() as group:
+            driver = group.create_task(Driver([mock], settings.speedup).run())
+            await stop.wait()
+            driver.cancel()
+    finally:
+        mock.close()
+    return 0
+
+
+def main(arguments: list[str]) -> int:
+    """Run until SIGTERM or SIGINT; 0 then, 2 for bad input."""
+    p = parser()
+    args = p.parse_args(arguments)
+    if not 0.01 <= args.speedup <= 100:
+        p.error("--speedup is from 0.01 to 100")
+    if not 1 <= args.sysid <= 255:
+        p.error("--sysid is from 1 to 255")
+    listen = args.listen or [Address("udpin", "127.0.0.1", 14540)]
+    return asyncio.run(_serve(settings_of(args), listen))

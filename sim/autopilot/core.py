@@ -1,0 +1,179 @@
+"""A whole mock autopilot without any input or output: bytes in, vehicle time on, bytes out.
+
+`receive` takes what came on a link, `advance` moves vehicle time by steps of STEP_S, and each link's
+`outbox` fills with frames. The same settings, bytes and steps give the same flight, bit by bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from sim.autopilot.ardupilot import ArduCopter
+from sim.autopilot.commands import Command
+from sim.autopilot.dialect import M
+from sim.autopilot.firmware import Firmware
+from sim.autopilot.link import Link
+from sim.autopilot.missions import Missions
+from sim.autopilot.parameter_protocol import ParameterProtocol
+from sim.autopilot.px4 import Px4
+from sim.autopilot.requests import Requests
+from sim.autopilot.setpoints import Setpoints
+from sim.autopilot.settings import STEP_S, Settings
+from sim.autopilot.telemetry import BUILDERS, heartbeat
+
+FIRMWARES: dict[str, type[Firmware]] = {"px4": Px4, "ardupilot": ArduCopter}
+
+_TICK_STEPS = round(0.1 / STEP_S)
+_STEP_US = round(STEP_S * 1e6)
+_CHUNK = 50  # characters of one STATUSTEXT
+_HEARTBEAT = M.MAVLINK_MSG_ID_HEARTBEAT
+
+Handler = Callable[[Link, Any], None]
+
+
+class Autopilot:
+    """One mock: a firmware with its vehicle, and the protocol services that serve its links."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.firmware = FIRMWARES[settings.flavor](settings)
+        self.vehicle = self.firmware.vehicle
+        self.links: list[Link] = []
+        self.carriers: list[Any] = []  # the transport's; the core does not look inside
+        self.missions = Missions(self)
+        self.requests = Requests(self)
+        self._text_id = 0
+        self._reached = -1
+        self._home_sent = False
+        self._handlers: dict[int, Handler] = {
+            M.MAVLINK_MSG_ID_COMMAND_LONG: self._on_command,
+            M.MAVLINK_MSG_ID_COMMAND_INT: self._on_command,
+            M.MAVLINK_MSG_ID_SET_MODE: self._on_set_mode,
+            M.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat,
+            M.MAVLINK_MSG_ID_MANUAL_CONTROL: self._on_manual_control,
+            M.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: self._on_rc_override,
+            **self.missions.handlers,
+            **self.requests.message_handlers,
+            **ParameterProtocol(self).handlers,
+            **Setpoints(self).handlers,
+        }
+        if self.firmware.heartbeat_on_mode_change:
+            self.firmware.mode_changed = lambda: self.broadcast(heartbeat(self))
+
+    # ---- what the telemetry builders read
+    @property
+    def time_ms(self) -> int:
+        """Vehicle time since boot, milliseconds."""
+        return self.vehicle.steps * 20
+
+    # ---- input and output
+    def add_link(self) -> Link:
+        """A new connection."""
+        link = Link(self)
+        self.links.append(link)
+        return link
+
+    def remove_link(self, link: Link) -> None:
+        """The connection is gone."""
+        self.links.remove(link)
+
+    def receive(self, link: Link, data: bytes) -> None:
+        """Take bytes that came on a link."""
+        for message in link.parse(data):
+            self._dispatch(link, message)
+        self._flush_texts()
+
+    def advance(self, steps: int = 1) -> None:
+        """Move vehicle time on by some steps."""
+        vehicle = self.vehicle
+        for _ in range(steps):
+            vehicle.step()
+            count = vehicle.steps
+            if count % _TICK_STEPS == 0:
+                self._tick()
+            now = count * _STEP_US
+            for link in self.links:
+                link.stream(now)
+
+    def broadcast(self, message: Any) -> None:
+        """Send a message on every link."""
+        for link in self.links:
+            link.send(message)
+
+    def announce_current(self) -> None:
+        """Tell every link the current mission item."""
+        self.broadcast(BUILDERS[M.MAVLINK_MSG_ID_MISSION_CURRENT](self))
+
+    # ---- inside
+    def _tick(self) -> None:
+        self.firmware.tick()
+        self.missions.tick()
+        plan = self.firmware.plan
+        if plan.reached != self._reached:
+            self._reached = plan.reached
+            if plan.reached >= 0:
+                self.broadcast(M.MAVLink_mission_item_reached_message(plan.reached))
+                self.announce_current()
+        if not self._home_sent and self.vehicle.home is not None:
+            self._home_sent = True
+            self.broadcast(BUILDERS[M.MAVLINK_MSG_ID_HOME_POSITION](self))
+            self.broadcast(BUILDERS[M.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN](self))
+        self._flush_texts()
+
+    def _flush_texts(self) -> None:
+        texts = self.vehicle.texts
+        while texts:
+            severity, text = texts.popleft()
+            if len(text) <= _CHUNK:
+                self.broadcast(M.MAVLink_statustext_message(severity, text.encode("ascii", "replace")))
+                continue
+            self._text_id = self._text_id % 65535 + 1
+            for k, start in enumerate(range(0, len(text), _CHUNK)):
+                part = text[start : start + _CHUNK].encode("ascii", "replace")
+                self.broadcast(M.MAVLink_statustext_message(severity, part, self._text_id, k))
+
+    def _dispatch(self, link: Link, message: Any) -> None:
+        number = message.get_msgId()
+        handler = self._handlers.get(number)
+        if handler is None:
+            return
+        firmware = self.firmware
+        if not firmware.obeys(message.get_srcSystem(), message.get_srcComponent()):
+            return
+        if number != _HEARTBEAT:
+            target = getattr(message, "target_system", getattr(message, "target", None))
+            if target is not None and not firmware.hears(target, getattr(message, "target_component", 0)):
+                return
+        handler(link, message)
+
+    def _on_command(self, link: Link, message: Any) -> None:
+        command = Command.of(message)
+        service = self.requests.handlers.get(command.number)
+        results = self.firmware.handle(command) if service is None else service(link, command)
+        to = message.get_srcSystem(), message.get_srcComponent()
+        for result in results:
+            link.send(M.MAVLink_command_ack_message(command.number, int(result), 0, 0, *to))
+
+    def _on_set_mode(self, link: Link, message: Any) -> None:
+        to = message.get_srcSystem(), message.get_srcComponent()
+        for result in self.firmware.on_set_mode_message(message.custom_mode):
+            link.send(M.MAVLink_command_ack_message(M.MAV_CMD_DO_SET_MODE, int(result), 0, 0, *to))
+
+    def _on_heartbeat(self, link: Link, message: Any) -> None:
+        is_companion = message.get_srcSystem() == self.settings.sysid and message.get_srcComponent() != 1
+        if is_companion and message.type == M.MAV_TYPE_ONBOARD_CONTROLLER:
+            self.firmware.companion_heard_at = self.vehicle.time
+
+    def _on_manual_control(self, link: Link, message: Any) -> None:
+        sticks = self.vehicle.sticks
+        sticks.heard_at = self.vehicle.time
+        sticks.pitch, sticks.roll = message.x / 1000.0, message.y / 1000.0
+        sticks.throttle, sticks.yaw = (message.z - 500) / 500.0, message.r / 1000.0
+
+    def _on_rc_override(self, link: Link, message: Any) -> None:
+        sticks = self.vehicle.sticks
+        sticks.heard_at = self.vehicle.time
+        raw = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)
+        roll, pitch, throttle, yaw = ((each - 1500) / 500.0 if 900 <= each <= 2100 else 0.0 for each in raw)
+        sticks.roll, sticks.pitch, sticks.throttle, sticks.yaw = roll, -pitch, throttle, yaw

@@ -1,0 +1,90 @@
+"""One MAVLink connection of a mock: framing, its own message rates, bytes waiting to be carried."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from sim.autopilot.dialect import M
+from sim.autopilot.telemetry import BUILDERS
+
+if TYPE_CHECKING:
+    from sim.autopilot.core import Autopilot
+
+_NEVER = 2**62
+_HEARTBEAT = int(M.MAVLINK_MSG_ID_HEARTBEAT)
+_BAD = "BAD_DATA"
+
+
+class _Stream:
+    __slots__ = ("builder", "due", "interval_us", "number")
+
+    def __init__(self, number: int, interval_us: int, due: int) -> None:
+        self.number, self.interval_us, self.due = number, interval_us, due
+        self.builder = BUILDERS[number]
+
+
+class Link:
+    """Bytes in, messages out; messages in, bytes out. `outbox` holds whole frames to be carried."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+        self._codec = M.MAVLink(None, srcSystem=autopilot.settings.sysid, srcComponent=1)
+        self._codec.robust_parsing = True
+        self.outbox: list[bytes] = []
+        self._streams: dict[int, _Stream] = {}
+        self._due = _NEVER
+        self.set_interval(_HEARTBEAT, 1_000_000)
+        for number, rate in autopilot.firmware.default_streams_hz.items():
+            self.set_interval(number, round(1e6 / rate))
+
+    # ---- sending
+    def send(self, message: Any) -> None:
+        """Put one message in the outbox."""
+        self.outbox.append(message.pack(self._codec))
+
+    def send_as(self, message: Any, system: int, component: int) -> None:
+        """Put a message of somebody else on the same wire in the outbox."""
+        other = M.MAVLink(None, srcSystem=system, srcComponent=component)
+        self.outbox.append(message.pack(other))
+
+    def interval_us(self, number: int) -> int:
+        """Interval of a message in microseconds, -1 when it is off."""
+        stream = self._streams.get(number)
+        return -1 if stream is None else stream.interval_us
+
+    def set_interval(self, number: int, interval_us: int) -> None:
+        """Send a message at an interval from now on; 0 is the flavour's default, below 0 is off."""
+        if interval_us == 0:
+            rate = self._autopilot.firmware.default_streams_hz.get(
+                number, 1.0 if number == _HEARTBEAT else 0.0
+            )
+            interval_us = round(1e6 / rate) if rate else -1
+        if interval_us < 0:
+            self._streams.pop(number, None)
+        else:
+            now = self._autopilot.vehicle.steps * 20_000
+            self._streams[number] = _Stream(number, max(interval_us, 20_000), now)
+            self._due = min(self._due, now)
+
+    def stream(self, now_us: int) -> None:
+        """Send what is due."""
+        if now_us < self._due:
+            return
+        autopilot, soonest = self._autopilot, _NEVER
+        for each in tuple(self._streams.values()):
+            if each.due <= now_us:
+                message = each.builder(autopilot)
+                if message is not None:
+                    self.send(message)
+                each.due += each.interval_us
+                if each.due <= now_us:
+                    each.due = now_us + each.interval_us
+            if each.due < soonest:
+                soonest = each.due
+        self._due = soonest
+
+    # ---- receiving
+    def parse(self, data: bytes) -> list[Any]:
+        """The valid messages in the bytes, in order; noise and bad checksums vanish."""
+        found = self._codec.parse_buffer(data) or []
+        return [each for each in found if each.get_type() != _BAD]

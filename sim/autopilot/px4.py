@@ -1,0 +1,366 @@
+"""PX4 v1.16: its modes, refusals and failsafes, as recorded from the real one."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from sim.autopilot.behaviours import (
+    Behaviour,
+    FollowSetpoints,
+    FollowSticks,
+    GoTo,
+    Land,
+    Return,
+    TakeOff,
+)
+from sim.autopilot.commands import ACCEPTED, REJECTED, UNSUPPORTED, Command, Result, Results
+from sim.autopilot.dialect import M
+from sim.autopilot.firmware import CRITICAL, FORCE, INFO, Firmware
+from sim.autopilot.motion import Limits
+from sim.autopilot.parameter_tables import PX4_PARAMETERS
+from sim.autopilot.parameters import Parameter
+from sim.autopilot.plan import FlyPlan
+from sim.autopilot.vehicle import Point
+
+_MAIN = {"MANUAL": 1, "ALTCTL": 2, "POSCTL": 3, "AUTO": 4, "ACRO": 5, "OFFBOARD": 6, "STABILIZED": 7}
+_SUB = {"READY": 1, "TAKEOFF": 2, "LOITER": 3, "MISSION": 4, "RTL": 5, "LAND": 6, "FOLLOW": 8, "PRECLAND": 9}
+
+
+def _custom(main: int, sub: int = 0) -> int:
+    return main << 16 | sub << 24
+
+
+_MODES: dict[str, tuple[int, int]] = {f"AUTO_{name}": (29, _custom(4, sub)) for name, sub in _SUB.items()}
+_MODES |= {name: (81, _custom(main)) for name, main in _MAIN.items() if name not in ("AUTO", "OFFBOARD")}
+_MODES["OFFBOARD"] = (17, _custom(6))
+_MODE_OF = {custom: name for name, (_, custom) in _MODES.items()}
+_STICK_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED")
+_NO_FAILSAFE = ("AUTO_RTL", "AUTO_LAND", "AUTO_TAKEOFF", "AUTO_PRECLAND")
+
+
+class Px4(Firmware):
+    """PX4 v1.16.0 as its SIH quadrotor answers on the ground station link."""
+
+    autopilot = M.MAV_AUTOPILOT_PX4
+    version = 1 << 24 | 16 << 16 | 255
+    capabilities = 59647 & ~M.MAV_PROTOCOL_CAPABILITY_FTP  # the recorded bits, without the file transfer
+    limits = Limits(
+        cruise=4.9,
+        accelerate=2.2,
+        brake=0.48,
+        jerk=5.2,
+        position_gain=2.2,
+        velocity_gain=1.3,
+        lag=0.45,
+        climb=2.9,
+        descend=1.5,
+        vertical_accelerate=2.5,
+        yaw_rate=60.0,
+    )
+    boot_mode, guided_mode, return_mode, land_mode = "AUTO_LOITER", "AUTO_LOITER", "AUTO_RTL", "AUTO_LAND"
+    heartbeat_modes = _MODES
+    default_streams_hz: ClassVar = {
+        M.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+        M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
+        M.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+        M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 10.0,
+        M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 10.0,
+        M.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+        M.MAVLINK_MSG_ID_GPS_RAW_INT: 5.0,
+        M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0,
+        M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+        M.MAVLINK_MSG_ID_VFR_HUD: 4.0,
+        M.MAVLINK_MSG_ID_ALTITUDE: 1.0,
+        M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 0.5,
+        M.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
+        M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 5.0,
+    }
+    unknown_request, unknown_interval = (Result.DENIED,), (Result.FAILED,)
+    requests_interval_message = False
+    heartbeat_on_mode_change = False
+    prearm_bit_everywhere = False
+    fence_frame = M.MAV_FRAME_GLOBAL_INT
+    plan_is_asked_int = True
+    refuses_wrong_seq = False
+    upload_retry_s, upload_timeout_s = 0.25, 5.0
+    parameters_as_bits, tells_index_by_name, echoes_when_changed = True, True, 2
+    serves_data_streams = False
+    target_fields = (M.MAV_FRAME_GLOBAL_INT, 0, True)
+    cells = 4
+    position_error_m, velocity_error_mps = 0.45, 0.06
+    landing_takes_s, disarm_after_landing_s = 1.0, 2.0
+    home_share = 0.2
+
+    def boot(self) -> None:
+        self._setpoint_at = -1e9
+        self._setpoints = FollowSetpoints()
+        self._takeoff_up: float | None = None
+        self._sticks_held = False
+        self._hold_until: float | None = None  # holding after the sticks were lost, before returning
+        self._low_said = 0
+        self._breached = False
+        self._companion_lost = False
+
+    def plan_received(self, kind: int) -> None:
+        """Nothing is said."""
+
+    def upload_timed_out(self) -> None:
+        self.vehicle.say(CRITICAL, "Operation timeout")
+
+    def parameter_table(self) -> list[Parameter]:
+        return PX4_PARAMETERS
+
+    def hears(self, system: int, component: int) -> bool:
+        return system == self.settings.sysid and component in (0, 1)
+
+    def obeys(self, system: int, component: int) -> bool:
+        return True
+
+    def system_status(self) -> int:
+        if self.vehicle.time < 1.0:
+            return int(M.MAV_STATE_UNINIT)
+        if self.failsafe:
+            return int(M.MAV_STATE_CRITICAL)
+        return int(M.MAV_STATE_ACTIVE if self.vehicle.armed else M.MAV_STATE_STANDBY)
+
+    # ---- modes
+    def behaviour_of(self, mode: str) -> Behaviour:
+        if not self.vehicle.armed:
+            return self.holding()
+        if mode == "AUTO_TAKEOFF" and self._takeoff_up is not None:
+            return self._climb_to(self._takeoff_up)
+        if mode == "AUTO_LAND" or mode == "AUTO_PRECLAND":
+            return self._landing(None)
+        if mode == "AUTO_RTL":
+            return self._return()
+        if mode == "AUTO_MISSION":
+            return FlyPlan(
+                self.plan, first=0, take_off=self._climb_to, land=self._landing, go_home=self._return
+            )
+        if mode == "OFFBOARD":
+            return self._setpoints
+        if mode in _STICK_MODES:
+            return FollowSticks()
+        return self.holding()
+
+    def _climb_to(self, up: float) -> TakeOff:
+        return TakeOff(up, spool_s=1.5, slow_below=10.0, slow_climb=self.parameters["MPC_TKO_SPEED"])
+
+    def _landing(self, place: tuple[float, float] | None) -> Land:
+        return Land(fast=1.5, slow=0.6, slow_below=7.5, place=place)
+
+    def _return(self) -> Return:
+        vehicle, home = self.vehicle, self.home_or_here()
+        seen = vehicle.seen
+        far = math.hypot(seen.north - home.north, seen.east - home.east) > 10.0
+        height = max(seen.up, home.up + self.parameters["RTL_RETURN_ALT"]) if far else seen.up
+        if vehicle.armed:
+            amsl, above = vehicle.amsl(height), height - home.up
+            vehicle.say(INFO, f"RTL: start return at {amsl:.0f} m ({above:.0f} m above destination)")
+        land = self._landing((home.north, home.east))
+        return Return(home, height, wait_s=0.0, land=land, say=lambda text: vehicle.say(INFO, text))
+
+    def set_mode(self, mode: str, behaviour: Behaviour | None = None) -> None:
+        if mode != "OFFBOARD":
+            self._hold_until = None
+        if mode == self.mode and behaviour is None and mode == "AUTO_LOITER":
+            return
+        super().set_mode(mode, behaviour)
+
+    def on_set_mode(self, command: Command) -> Results:
+        if not int(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            return ACCEPTED + REJECTED
+        main = int(command.param2)
+        return ACCEPTED + self._enter(_custom(main, int(command.param3) if main == _MAIN["AUTO"] else 0))
+
+    def on_set_mode_message(self, custom_mode: int) -> Results:
+        return self._enter(custom_mode)
+
+    def _enter(self, custom_mode: int) -> Results:
+        mode = _MODE_OF.get(custom_mode)
+        if mode is None:
+            return ACCEPTED  # and nothing changes
+        if mode == "OFFBOARD" and self.vehicle.time - self._setpoint_at > self._setpoint_timeout:
+            self.vehicle.say(CRITICAL, "Switching to Offboard is currently not available")
+            return REJECTED
+        if mode == "AUTO_MISSION" and not self.plan.mission:
+            self.vehicle.say(CRITICAL, "Switching to Mission is currently not available")
+            return REJECTED
+        needs_position = mode in ("POSCTL", "OFFBOARD") or (mode.startswith("AUTO_") and mode != "AUTO_LAND")
+        if needs_position and self.vehicle.armed and not self.position_known:
+            self.vehicle.say(CRITICAL, f"Switching to {mode} is currently not available")
+            return REJECTED
+        self.failsafe = False
+        self.set_mode(mode)
+        return ACCEPTED
+
+    # ---- commands
+    def on_arm(self, command: Command) -> Results:
+        vehicle = self.vehicle
+        force = command.param2 == FORCE
+        if command.param1 == 0.0:
+            if vehicle.flying and not force:
+                vehicle.say(CRITICAL, "Disarming denied: not landed")
+                return REJECTED
+            self.disarm("Disarmed by external command", landed=False)
+            return ACCEPTED
+        if vehicle.armed:
+            return ACCEPTED
+        if not self.ready and not force:
+            vehicle.say(CRITICAL, "Arming denied: Resolve system health failures first")
+            return REJECTED
+        self.arm("Armed by external command")
+        return ACCEPTED
+
+    def on_takeoff(self, command: Command) -> Results:
+        vehicle = self.vehicle
+        height = self.parameters["MIS_TAKEOFF_ALT"] + vehicle.seen.up
+        up = height if math.isnan(command.z) else command.z - vehicle.ground_amsl
+        if vehicle.armed and up <= vehicle.seen.up:
+            vehicle.say(CRITICAL, "Already higher than takeoff altitude")
+            self._takeoff_up = None
+        else:
+            self._takeoff_up = up
+        self.set_mode("AUTO_TAKEOFF", self.behaviour_of("AUTO_TAKEOFF"))
+        return ACCEPTED
+
+    def on_land(self, command: Command) -> Results:
+        self.vehicle.say(INFO, "Landing at current position")
+        return super().on_land(command)
+
+    def on_return(self, command: Command) -> Results:
+        self.vehicle.say(INFO, "Returning to launch")
+        return super().on_return(command)
+
+    def on_reposition(self, command: Command) -> Results:
+        flags = 0 if math.isnan(command.param2) else int(command.param2)
+        plain = flags == 1
+        if not plain and self.mode != "AUTO_LOITER":
+            return UNSUPPORTED
+        result = ACCEPTED if plain else UNSUPPORTED  # the guided mode flies there all the same
+        vehicle = self.vehicle
+        place = self.place(command)
+        if place is not None and self.breaches_fence(*place):
+            vehicle.say(CRITICAL, "Reposition is outside geofence")
+            if plain:
+                self.set_mode("AUTO_LOITER")
+            return result
+        here = self.target_or_seen() if place is None else None
+        north, east = (here.north, here.east) if here is not None else place or (0.0, 0.0)
+        yaw = None if math.isnan(command.param4) else math.degrees(command.param4) % 360.0
+        speed = command.param1 if command.param1 > 0 else None
+        leg = GoTo(Point(north, east, self.up_of_amsl(command.z)), yaw=yaw, speed=speed, straight=True)
+        self.failsafe = False
+        if vehicle.flying:
+            if not vehicle.stuck:
+                self.set_mode("AUTO_LOITER", leg)
+        elif plain:
+            self.set_mode("AUTO_LOITER")
+        return result
+
+    def on_change_speed(self, command: Command) -> Results:
+        if command.param2 > 0:
+            self.vehicle.speed_limit = min(command.param2, 12.0)
+        elif command.param2 < -1.5:
+            self.vehicle.speed_limit = None
+        return ACCEPTED
+
+    def on_mission_start(self, command: Command) -> Results:
+        if not self.plan.mission:
+            return REJECTED
+        return self._enter(_MODES["AUTO_MISSION"][1])
+
+    def on_setpoint(
+        self, position: Point | None, velocity: tuple[float, float, float] | None, yaw: float | None
+    ) -> None:
+        self._setpoint_at = self.vehicle.time
+        if self.vehicle.stuck:
+            return
+        self._setpoints.position, self._setpoints.yaw = position, yaw
+        self._setpoints.velocity = velocity or (0.0, 0.0, 0.0)
+
+    @property
+    def _setpoint_timeout(self) -> float:
+        return max(self.parameters["COM_OF_LOSS_T"], self.link_floor_s)
+
+    # ---- what it watches
+    def disarmed(self, landed: bool) -> None:
+        if landed:
+            self.set_mode("AUTO_LOITER")
+
+    def disarm_text(self, *, landed: bool) -> str:
+        return "Disarmed by landing" if landed else "Disarmed by auto preflight disarming"
+
+    def landing_seen(self) -> None:
+        self.vehicle.say(INFO, "Landing detected")
+
+    def watch(self) -> None:
+        vehicle, time = self.vehicle, self.vehicle.time
+        behaviour = vehicle.behaviour
+        if self.mode == "AUTO_TAKEOFF" and isinstance(behaviour, TakeOff) and behaviour.done:
+            self.set_mode("AUTO_LOITER", GoTo(behaviour.target))
+        if self.mode == "AUTO_MISSION" and isinstance(behaviour, FlyPlan) and behaviour.holds is not None:
+            vehicle.say(INFO, "Mission finished, loitering")
+            self.set_mode("AUTO_LOITER", behaviour.holds)
+        if self.mode == "OFFBOARD" and vehicle.armed and time - self._setpoint_at > self._setpoint_timeout:
+            self._fail("Failsafe activated", "POSCTL")
+        self._watch_sticks(time)
+        self._watch_companion(time)
+        self._watch_position(time)
+        self._watch_battery()
+        self._watch_fence()
+
+    def _fail(self, text: str, mode: str) -> None:
+        self.vehicle.say(CRITICAL, text)
+        self.set_mode(mode)
+        self.failsafe = True
+
+    def _watch_sticks(self, time: float) -> None:
+        timeout = max(self.parameters["COM_RC_LOSS_T"], self.link_floor_s) + 0.5
+        held = time - self.vehicle.sticks.heard_at < timeout
+        lost = self._sticks_held and not held
+        self._sticks_held = held
+        if lost and self.vehicle.flying and self.mode not in _NO_FAILSAFE and self.mode != "OFFBOARD":
+            self._fail("Failsafe activated: entering Hold for 5 seconds", "AUTO_LOITER")
+            self._hold_until = time + 5.0
+        if self._hold_until is not None and time >= self._hold_until:
+            self._hold_until = None
+            if self.failsafe and self.vehicle.flying:
+                self._fail("Failsafe activated", "AUTO_RTL")
+
+    def _watch_companion(self, time: float) -> None:
+        heard = self.companion_heard_at
+        lost = heard is not None and time - heard > max(self.parameters["COM_OBC_LOSS_T"], self.link_floor_s)
+        if lost and not self._companion_lost:
+            self.vehicle.say(CRITICAL, "Connection to mission computer lost")
+        self._companion_lost = lost
+
+    def _watch_position(self, time: float) -> None:
+        if self.vehicle.flying and not self.position_known and self.mode not in ("AUTO_LAND", "ALTCTL"):
+            self._fail("Failsafe activated", "AUTO_LAND")
+
+    def _watch_battery(self) -> None:
+        charge = self.vehicle.battery.charge
+        levels = (
+            (self.parameters["BAT_LOW_THR"], "Low battery level, return advised"),
+            (self.parameters["BAT_CRIT_THR"], "Critical battery level, land now"),
+            (self.parameters["BAT_EMERGEN_THR"], "Dangerous battery level, land now"),
+        )
+        while self._low_said < len(levels) and charge < levels[self._low_said][0]:
+            self._low_said += 1
+            self.vehicle.say(CRITICAL, levels[self._low_said - 1][1])
+            action = int(self.parameters["COM_LOW_BAT_ACT"])
+            if action > 0 and self._low_said >= 2 and self.vehicle.flying:
+                lands = action == 2 or (action == 3 and self._low_said >= 3)
+                self._fail("Failsafe activated", "AUTO_LAND" if lands else "AUTO_RTL")
+
+    def _watch_fence(self) -> None:
+        vehicle = self.vehicle
+        outside = vehicle.flying and self.breaches_fence(vehicle.seen.north, vehicle.seen.east)
+        if outside and not self._breached:
+            vehicle.say(CRITICAL, "Geofence violation: approaching or outside geofence")
+            action = int(self.parameters["GF_ACTION"])
+            if action in (2, 3, 5):
+                self._fail("Failsafe activated", {2: "AUTO_LOITER", 3: "AUTO_RTL", 5: "AUTO_LAND"}[action])
+        self._breached = outside

@@ -1,0 +1,324 @@
+"""The messages an autopilot tells about itself with, one builder each. Units and sentinels as recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from sim.autopilot.dialect import NAN, M
+
+if TYPE_CHECKING:
+    from sim.autopilot.core import Autopilot
+
+_GPS = M.MAV_SYS_STATUS_SENSOR_GPS
+_AHRS = M.MAV_SYS_STATUS_AHRS
+_BATTERY = M.MAV_SYS_STATUS_SENSOR_BATTERY
+_PREARM = M.MAV_SYS_STATUS_PREARM_CHECK
+_SENSORS = (
+    M.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | M.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | M.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | M.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | _GPS
+    | _AHRS
+    | _BATTERY
+)
+
+
+def heartbeat(a: Autopilot) -> Any:
+    """HEARTBEAT."""
+    base, custom = a.firmware.heartbeat_modes[a.firmware.mode]
+    if a.vehicle.armed:
+        base |= M.MAV_MODE_FLAG_SAFETY_ARMED
+    return M.MAVLink_heartbeat_message(
+        M.MAV_TYPE_QUADROTOR, a.firmware.autopilot, base, custom, a.firmware.system_status(), 3
+    )
+
+
+def global_position_int(a: Autopilot) -> Any:
+    """GLOBAL_POSITION_INT: what the vehicle believes."""
+    body, error = a.vehicle.body, a.vehicle.estimator
+    latitude, longitude = a.vehicle.frame.to_e7(body.north + error.north, body.east + error.east)
+    up = body.up + error.up
+    home = a.vehicle.home
+    return M.MAVLink_global_position_int_message(
+        a.time_ms,
+        latitude,
+        longitude,
+        round((a.vehicle.ground_amsl + up) * 1000.0),
+        round((up - (0.0 if home is None else home.up)) * 1000.0),
+        _cm(body.velocity_north + error.velocity_north),
+        _cm(body.velocity_east + error.velocity_east),
+        _cm(-body.velocity_up - error.velocity_up),
+        round(body.yaw * 100.0) % 36000,
+    )
+
+
+def _cm(metres: float) -> int:
+    return max(-32767, min(32767, round(metres * 100.0)))
+
+
+def local_position_ned(a: Autopilot) -> Any:
+    """LOCAL_POSITION_NED: from the place of boot."""
+    body, error = a.vehicle.body, a.vehicle.estimator
+    return M.MAVLink_local_position_ned_message(
+        a.time_ms,
+        body.north + error.north,
+        body.east + error.east,
+        -body.up - error.up,
+        body.velocity_north + error.velocity_north,
+        body.velocity_east + error.velocity_east,
+        -body.velocity_up - error.velocity_up,
+    )
+
+
+def _angles(a: Autopilot) -> tuple[float, float, float]:
+    """Roll, pitch and yaw in radians, from the tilt that makes the acceleration."""
+    yaw = math.radians(a.vehicle.body.yaw)
+    north, east = a.vehicle.body.tilt
+    forward = north * math.cos(yaw) + east * math.sin(yaw)
+    right = -north * math.sin(yaw) + east * math.cos(yaw)
+    return math.atan(right / 9.81), -math.atan(forward / 9.81), (yaw + math.pi) % (2 * math.pi) - math.pi
+
+
+def attitude(a: Autopilot) -> Any:
+    """ATTITUDE."""
+    roll, pitch, yaw = _angles(a)
+    return M.MAVLink_attitude_message(
+        a.time_ms, roll, pitch, yaw, 0.0, 0.0, math.radians(a.vehicle.body.yaw_rate)
+    )
+
+
+def attitude_quaternion(a: Autopilot) -> Any:
+    """ATTITUDE_QUATERNION."""
+    roll, pitch, yaw = _angles(a)
+    cr, sr, cp, sp = math.cos(roll / 2), math.sin(roll / 2), math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return M.MAVLink_attitude_quaternion_message(
+        a.time_ms,
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        0.0,
+        0.0,
+        math.radians(a.vehicle.body.yaw_rate),
+    )
+
+
+def sys_status(a: Autopilot) -> Any:
+    """SYS_STATUS; the pre-arm check is ready-to-arm, in health always, elsewhere as the flavour has it."""
+    firmware, battery = a.firmware, a.vehicle.battery
+    present = enabled = health = _SENSORS
+    if firmware.prearm_bit_everywhere:
+        present, enabled = present | _PREARM, enabled | _PREARM
+    if a.vehicle.gps.lost:
+        health &= ~_GPS
+    if not firmware.position_known:
+        health &= ~_AHRS
+    if firmware.ready:
+        health |= _PREARM
+    return M.MAVLink_sys_status_message(
+        present,
+        enabled,
+        health,
+        160,
+        round(battery.voltage * 1000.0),
+        round(battery.current_a * 100.0),
+        battery.percent,
+        *(0,) * 6,
+    )
+
+
+def battery_status(a: Autopilot) -> Any:
+    """BATTERY_STATUS: the whole pack in the first cell, the time remaining unknown (0)."""
+    battery = a.vehicle.battery
+    charge = battery.charge
+    state = M.MAV_BATTERY_CHARGE_STATE_OK
+    if charge < 0.07:
+        state = M.MAV_BATTERY_CHARGE_STATE_CRITICAL
+    elif charge < 0.15:
+        state = M.MAV_BATTERY_CHARGE_STATE_LOW
+    return M.MAVLink_battery_status_message(
+        0,
+        M.MAV_BATTERY_FUNCTION_ALL,
+        M.MAV_BATTERY_TYPE_LIPO,
+        32767,
+        [round(battery.voltage * 1000.0)] + [65535] * 9,
+        round(battery.current_a * 100.0),
+        round(battery.used_mah),
+        -1,
+        battery.percent,
+        0,
+        state,
+    )
+
+
+def gps_raw_int(a: Autopilot) -> Any:
+    """GPS_RAW_INT: the receiver's own position and error."""
+    body, gps = a.vehicle.body, a.vehicle.gps
+    stamp = a.vehicle.steps * 20_000
+    if gps.lost:
+        return M.MAVLink_gps_raw_int_message(stamp, 1, 0, 0, 0, 65535, 65535, 65535, 65535, 0)
+    latitude, longitude = a.vehicle.frame.to_e7(body.north + gps.north, body.east + gps.east)
+    course = math.degrees(math.atan2(body.velocity_east, body.velocity_north)) % 360.0
+    return M.MAVLink_gps_raw_int_message(
+        stamp,
+        3,
+        latitude,
+        longitude,
+        round((a.vehicle.ground_amsl + body.up + gps.up) * 1000.0),
+        90,
+        130,
+        round(body.speed * 100.0),
+        round(course * 100.0) % 36000,
+        gps.satellites,
+        round((a.vehicle.ground_amsl + body.up + gps.up) * 1000.0),
+        900,
+        1780,
+        400,
+        0,
+    )
+
+
+def extended_sys_state(a: Autopilot) -> Any:
+    """EXTENDED_SYS_STATE."""
+    return M.MAVLink_extended_sys_state_message(a.firmware.vtol_state, int(a.vehicle.landed))
+
+
+def home_position(a: Autopilot) -> Any | None:
+    """HOME_POSITION, once there is a home."""
+    home = a.vehicle.home
+    if home is None:
+        return None
+    latitude, longitude = a.vehicle.frame.to_e7(home.north, home.east)
+    return M.MAVLink_home_position_message(
+        latitude,
+        longitude,
+        round(a.vehicle.amsl(home.up) * 1000.0),
+        home.north,
+        home.east,
+        -home.up,
+        [1.0, 0.0, 0.0, 0.0],
+        0.0,
+        0.0,
+        0.0,
+    )
+
+
+def gps_global_origin(a: Autopilot) -> Any:
+    """GPS_GLOBAL_ORIGIN: the origin of the local frame."""
+    latitude, longitude = a.vehicle.frame.to_e7(0.0, 0.0)
+    return M.MAVLink_gps_global_origin_message(latitude, longitude, round(a.vehicle.ground_amsl * 1000.0))
+
+
+def vfr_hud(a: Autopilot) -> Any:
+    """VFR_HUD."""
+    body, error = a.vehicle.body, a.vehicle.estimator
+    speed = math.hypot(body.velocity_north + error.velocity_north, body.velocity_east + error.velocity_east)
+    return M.MAVLink_vfr_hud_message(
+        0.0,
+        speed,
+        round(body.yaw) % 360,
+        0 if not a.vehicle.armed else 10 if body.on_ground else 50,
+        a.vehicle.amsl(body.up + error.up),
+        body.velocity_up + error.velocity_up,
+    )
+
+
+def position_target_global_int(a: Autopilot) -> Any | None:
+    """POSITION_TARGET_GLOBAL_INT: the final target at once, altitude AMSL."""
+    target = a.firmware.target_or_seen()
+    frame, mask, stays_silent = a.firmware.target_fields
+    if stays_silent and not a.vehicle.flying:
+        return None
+    latitude, longitude = a.vehicle.frame.to_e7(target.north, target.east)
+    return M.MAVLink_position_target_global_int_message(
+        a.time_ms, frame, mask, _e7(latitude), _e7(longitude), a.vehicle.amsl(target.up), *(0.0,) * 8
+    )
+
+
+def _e7(value: int) -> int:
+    return max(-(2**31), min(2**31 - 1, value))
+
+
+def altitude(a: Autopilot) -> Any:
+    """ALTITUDE."""
+    up = a.vehicle.seen.up
+    home_up = 0.0 if a.vehicle.home is None else a.vehicle.home.up
+    amsl = a.vehicle.amsl(up)
+    return M.MAVLink_altitude_message(a.vehicle.steps * 20_000, amsl, amsl, up, up - home_up, NAN, NAN)
+
+
+def system_time(a: Autopilot) -> Any:
+    """SYSTEM_TIME."""
+    return M.MAVLink_system_time_message(round((a.settings.epoch_s + a.vehicle.time) * 1e6), a.time_ms)
+
+
+def mission_current(a: Autopilot) -> Any:
+    """MISSION_CURRENT."""
+    plan = a.firmware.plan
+    return M.MAVLink_mission_current_message(plan.current, len(plan.mission))
+
+
+def estimator_status(a: Autopilot) -> Any:
+    """ESTIMATOR_STATUS: all well, or the horizontal position and velocity out of bounds."""
+    known = a.firmware.position_known
+    good = 1 | 2 | 4 | 8 | 16 | 32 | 512 | 256
+    flags = good if known else 1 | 4 | 32 | 128 | 1024
+    ratio = 0.05 if known else 2.0
+    return M.MAVLink_estimator_status_message(
+        a.vehicle.steps * 20_000, flags, ratio, ratio, 0.05, 0.05, 0.0, 0.0, 0.5 if known else 50.0, 0.8
+    )
+
+
+def ekf_status_report(a: Autopilot) -> Any:
+    """EKF_STATUS_REPORT, ArduPilot's own."""
+    known = a.firmware.position_known
+    flags = 1 | 2 | 4 | 8 | 16 | 32 | 256 | 512 if known else 1 | 4 | 32 | 128
+    ratio = 0.05 if known else 2.0
+    return M.MAVLink_ekf_status_report_message(flags, ratio, ratio, 0.05, 0.05, 0.0)
+
+
+def autopilot_version(a: Autopilot) -> Any:
+    """AUTOPILOT_VERSION."""
+    firmware = a.firmware
+    return M.MAVLink_autopilot_version_message(
+        firmware.capabilities,
+        firmware.version,
+        firmware.version,
+        0,
+        0,
+        [0] * 8,
+        [0] * 8,
+        [0] * 8,
+        0,
+        0,
+        a.settings.sysid + 0x526F6900,
+    )
+
+
+Builder = Callable[["Autopilot"], Any]
+
+BUILDERS: dict[int, Builder] = {
+    M.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
+    M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: global_position_int,
+    M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: local_position_ned,
+    M.MAVLINK_MSG_ID_ATTITUDE: attitude,
+    M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: attitude_quaternion,
+    M.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
+    M.MAVLINK_MSG_ID_BATTERY_STATUS: battery_status,
+    M.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw_int,
+    M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: extended_sys_state,
+    M.MAVLINK_MSG_ID_HOME_POSITION: home_position,
+    M.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: gps_global_origin,
+    M.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
+    M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target_global_int,
+    M.MAVLINK_MSG_ID_ALTITUDE: altitude,
+    M.MAVLINK_MSG_ID_SYSTEM_TIME: system_time,
+    M.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,
+    M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: estimator_status,
+    M.MAVLINK_MSG_ID_EKF_STATUS_REPORT: ekf_status_report,
+    M.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
+}

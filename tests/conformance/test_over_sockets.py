@@ -1,0 +1,53 @@
+"""The same exchanges with a mock process over a real socket, faster than real time.
+
+In lockstep (test_conformance) nothing can come late. Here UDP, TCP, the event loop and the speed-up are in
+the way, as they are for everybody else who uses the mock.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.autopilot.process import AutopilotProcess
+from tests.conformance.compare import differences, record
+from tests.conformance.dialogue import Dialogue
+from tests.conformance.exchanges import hold
+from tests.conformance.wire import Socket
+
+SPEEDUP = 20.0
+NAMES = (
+    "request_message",
+    "message_interval",
+    "parameters",
+    "mode_commands",
+    "command_sources",
+    "mavlink1_frame",
+    "garbage_bytes",
+    "mission_protocol",
+    "takeoff_20m",
+    "telemetry_fields",
+    "hop_20m",
+    "train_corners",
+    "setpoint_stream",
+    "fence_reposition",
+    "pilot_takeover",
+    "sticks_lost",
+    "rtl_land",
+)
+
+
+@pytest.mark.parametrize(
+    ("flavor", "url"), [("px4", "udpin://127.0.0.1:0"), ("ardupilot", "tcpin://127.0.0.1:0")]
+)
+def test_mock_answers_as_the_real_autopilot_over_a_socket(flavor: str, url: str) -> None:
+    with AutopilotProcess(flavor, listen=(url, url), speedup=SPEEDUP, options=("--sysid", "7")) as mock:
+        wire = Socket(mock.urls[0], mock.urls[1], SPEEDUP)
+        dialogue = Dialogue(wire, flavor)
+        dialogue.wait(lambda: dialogue.system, 60)
+        wrong = [
+            f"{name}.{line}"
+            for name in NAMES
+            for line in differences(record(flavor)[name], hold(dialogue, name))
+        ]
+        wire.close()
+    assert wrong == []

@@ -1,0 +1,54 @@
+"""The mock as a process: what it prints, how it ends, what it says to bad input."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as m
+
+from tests.fixtures_autopilot import StartAutopilot, flavor, start_autopilot
+
+__all__ = ["flavor", "start_autopilot"]
+
+
+def test_prints_the_resolved_port_and_ends_with_zero_on_sigterm(start_autopilot: StartAutopilot) -> None:
+    mock = start_autopilot("px4", listen=("udpin://127.0.0.1:0", "tcpin://127.0.0.1:0"))
+    assert mock.urls[0].startswith("udpin://127.0.0.1:")
+    assert mock.urls[1].startswith("tcpin://127.0.0.1:")
+    assert mock.port > 0
+    assert mock.stop() == 0
+
+
+def test_answers_whoever_speaks_first_on_udp(start_autopilot: StartAutopilot, flavor: str) -> None:
+    mock = start_autopilot(flavor, options=("--sysid", "7"))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        client.settimeout(10)
+        codec = m.MAVLink(None, srcSystem=255, srcComponent=190)
+        hello = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3)
+        client.sendto(hello.pack(codec), ("127.0.0.1", mock.port))
+        kinds = set()
+        while "HEARTBEAT" not in kinds:
+            for message in codec.parse_buffer(client.recv(65535)) or []:
+                kinds.add(message.get_type())
+                assert (message.get_srcSystem(), message.get_srcComponent()) == (7, 1)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--listen", "udp://nowhere"),
+        ("--home", "1,2"),
+        ("--speedup", "1000"),
+        ("--flavor", "betaflight"),
+        ("--sysid", "0"),
+    ],
+)
+def test_bad_options_end_with_two_and_one_sentence(options: tuple[str, ...]) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "sim", "autopilot", *options], capture_output=True, timeout=60, check=False
+    )
+    assert run.returncode == 2
+    assert b"Traceback" not in run.stderr

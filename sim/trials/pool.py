@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -31,7 +33,7 @@ def executor(jobs: int, scheduler: str = "") -> Iterator[tuple[Executor, int]]:
             yield answer
         return
     pool = ProcessPoolExecutor(
-        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_the_terminal
+        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_the_campaign
     )
     try:
         yield pool, jobs
@@ -39,9 +41,17 @@ def executor(jobs: int, scheduler: str = "") -> Iterator[tuple[Executor, int]]:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _end_with_the_terminal() -> None:
-    """Let Ctrl-C end a worker at once and without a word; what it was doing is done again."""
+def _end_with_the_campaign() -> None:
+    """Let Ctrl-C, and the end of the campaign however it comes, end a worker at once and without a word."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -26,6 +27,23 @@ def contents(folder):
 
 def command(out, *words):
     return [sys.executable, "-m", "sim", "trials", *WORDS, *words, "--out", str(out)]
+
+
+def workers_of(pid):
+    """The pool's processes of a campaign."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    workers = [
+        int(child) for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
+    assert workers
+    return workers
+
+
+def alive(pid):
+    try:
+        return ") Z" not in Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +76,13 @@ def test_a_killed_campaign_goes_on_where_it_was(once, tmp_path):
             assert process.poll() is None
             assert time.monotonic() < give_up
             time.sleep(0.005)
+        workers = workers_of(process.pid)
     finally:
-        os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
         process.wait()
+    while any(alive(worker) for worker in workers):  # they end with the campaign
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
     before = journal.read_bytes()
     with journal.open("ab") as file:  # a line that was being written
         file.write(b'{"kind":"search","pla')

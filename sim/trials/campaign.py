@@ -58,7 +58,8 @@ class Campaign:
         found: "hit", the search ends with the first true hit; "covered", with the target first in view.
         preset: for the planners that have presets and do not name one.
         cap: the most steps of a search.
-        iterations, deadline_s: of the tree searches; None leaves them as the preset has them.
+        iterations: of the tree searches; None leaves them as the preset has them, or as the deadline allows.
+        deadline_s: of every decision, or None.
         p_tp, p_tn: the detector, in every cell of the field of view.
         shape, start: of the paper's map; the heading at the start is north.
         tail: a detection curve is followed until less than this probability is left undetected.
@@ -166,13 +167,17 @@ class Campaign:
             raise ValueError(f"there is no planner '{name}'; there is {', '.join(PLANNERS)}")
         if name.startswith("puct"):
             options = {"preset": preset or self.preset, **options}
-            if self.iterations is not None:
+            if self.iterations is not None or self.deadline_s is not None:
                 options.setdefault("iterations", self.iterations)
         elif preset:
             raise ValueError(f"{name} has no presets, so '@{preset}' means nothing")
         if flyable is not None:
             options["flyable"] = flyable
         return make_planner(name, fov=self.fov(fov), **options)
+
+    def warm_up(self, spec: str, fov: str) -> None:
+        """Compile what a planner needs."""
+        replace(self, deadline_s=None).planner(spec, fov, None).warm_up()
 
     def scenario(self, trial: int) -> Scenario:
         """The map of trial `trial`: the same for every planner and field of view."""

@@ -219,7 +219,7 @@ def _compile(campaign: Campaign, progress: Progress) -> None:
     scenarios = campaign.scenarios()
     bar = progress.add_task("compiling", total=len(scenarios))
     for planner, fov in scenarios:
-        campaign.planner(planner, fov, None).warm_up()
+        campaign.warm_up(planner, fov)
         progress.advance(bar)
     progress.remove_task(bar)
 

@@ -46,7 +46,7 @@ def run_job(campaign: Campaign, job: Job) -> list[dict[str, Any]]:
         return [{**result, "timing": {"seconds": time.perf_counter() - began}}]
     key = (job.planner.partition(":")[0], job.fov)
     if key not in _warm:
-        campaign.planner(job.planner, job.fov, None).warm_up()
+        campaign.warm_up(job.planner, job.fov)
         _warm.add(key)
         began = time.perf_counter()
     follow = job.kind == CURVE

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roisearch import FieldOfView, bounds
+from roisearch import FieldOfView, bounds, make_planner
+from sim.ruler import detection_curve
 from sim.trials import published
 from sim.trials.campaign import BOUND, CURVE, FOVS, SEARCH, Campaign, Job
 from sim.trials.claims import weigh
@@ -91,6 +92,19 @@ def test_no_curve_is_above_the_bound_of_its_prior(fov, found):
         (bound,) = run_job(campaign, Job(BOUND, "", fov, trial))
         assert (np.array(curve["curve"]) <= np.array(bound["curve"]) + 1e-9).all()
         assert curve["expected"] >= bound["expected"] >= bound["teleport"] - 1e-9
+
+
+@pytest.mark.parametrize("fov", FOVS)
+def test_a_curve_is_that_of_the_plain_ruler(fov):
+    campaign = replace(SMALL, fovs=(fov,), trials=0, curves=1, p_tn=1.0, tail=0.0)
+    (curve,) = run_job(campaign, Job(CURVE, "index", fov, 0))
+    view = campaign.fov(fov)
+    plain = detection_curve(
+        make_planner("index", fov=view), campaign.scenario(0).prior, campaign.start, 0.9, campaign.cap,
+        np.random.default_rng(0), fov=view,
+    )  # fmt: skip
+    assert curve["expected"] == pytest.approx(bounds.expected_time(plain), rel=1e-9)
+    assert np.allclose(curve["curve"], plain[grid(campaign.cap)], atol=1e-9)
 
 
 def test_searches_are_found_as_often_as_the_curve_says():
@@ -203,3 +217,13 @@ def test_published_numbers_are_found_whatever_is_asked_of_a_planner():
     assert published.time_per_step("puct@paper:iterations=40") == published.TIME_PER_STEP_MS["puct"]
     assert published.time_per_step("index") is None
     assert published.shown("puct-regions-lite@paper") == "PUCT Regions Lite @paper"
+
+
+@pytest.mark.parametrize("planner", ["puct-regions-lite@paper", "index"])
+def test_a_deadline_bounds_a_decision_instead_of_iterations(planner):
+    campaign = replace(SMALL, planners=(planner,), trials=1, cap=20, deadline_s=0.002)
+    assert not campaign.deterministic
+    (result,) = run_job(campaign, Job(SEARCH, planner, "point", 0))
+    assert 1 <= result["steps"] <= 20
+    if "paper" in planner:
+        assert campaign.planner(planner, "point", None).settings.iterations is None

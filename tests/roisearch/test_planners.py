@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
 from roisearch import PLANNERS, Belief, FieldOfView, SearchState, make_planner
+from roisearch.bounds import multi_cell, release
 from roisearch.fov import HEADINGS, MOVES
 from roisearch.planners.base import Planner
 from tests.roisearch.strategies import World, worlds
@@ -163,3 +166,29 @@ def test_warm_up_tells_its_steps_and_leaves_nothing_to_compile() -> None:
     planner = make_planner("puct-regions-lite", fov=FieldOfView.point())
     planner.warm_up(lambda step, number, total: told.append((step, number, total)))
     assert [number for _, number, _ in told] == list(range(1, told[-1][2] + 1))
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+@pytest.mark.parametrize("fov", [FieldOfView.point(), FieldOfView.donut(), FieldOfView.wide_angle()])
+def test_no_planner_beats_the_bound(name: str, fov: FieldOfView) -> None:
+    down, right = np.mgrid[0:24, 0:24]
+    prior = np.exp(-((down - 15) ** 2 + (right - 17) ** 2) / 20) + np.exp(
+        -((down - 4) ** 2 + (right - 18) ** 2) / 9
+    )
+    prior /= prior.sum()
+    start, steps = (2, 2), 150
+    entered = fly(make_planner(name, fov=fov), Belief(prior), fov, start, steps)
+    missed = prior.copy()
+    found = [0.0]
+    for before, cell in pairwise(entered):
+        heading = HEADINGS[MOVES.index((cell[0] - before[0], cell[1] - before[1]))]
+        gain = 0.0
+        for seen in fov.cells(cell, heading, prior.shape).tolist():
+            gain += 0.9 * missed[tuple(seen)]
+            missed[tuple(seen)] *= 1.0 - 0.9
+        found.append(found[-1] + gain)
+    if fov.is_point:
+        bound = release(prior, start, 0.9, steps)
+    else:
+        bound = multi_cell(prior, start, fov, 0.9, steps)
+    assert (np.array(found) <= bound + 1e-12).all()

@@ -25,7 +25,7 @@ def go_to(
     queue: Ints,
     path: Ints,
 ) -> int:
-    """Write the trip to a look at `goal` into `path`; how many cells. `field`: [1, cells], [0, ..] on open."""
+    """Write the trip to a look at `goal` into `path`; how many cells. `field`: [1, cells], [0, ..] open."""
     sources = np.empty((1, 4 * sight.offsets.shape[1], 3), dtype=np.int64)
     count = find_sources(goal, land, sight, sources[0])
     if field.shape[0] > 0:
@@ -151,7 +151,8 @@ def follow_horizon(
         r -= col_step(move)
     d, r = best_row, best_col
     for place in range(length - 1, -1, -1):
-        path[place] = (row + d) * cols + col + r
+        path[0, place] = row + d
+        path[1, place] = col + r
         move = window[d + horizon, r + horizon]
         d -= row_step(move)
         r -= col_step(move)

@@ -51,7 +51,7 @@ class IndexPlanner:
         cells, is_open, fov, forest = rows * cols, scene.ground.is_open, self._fov, scene.forest
         worth = np.ones(8 + (rows + cols if is_open else cells))
         worth[1:] = np.arange(1, worth.size, dtype=np.float64) ** (-1.0 / self._alpha)
-        self._path = np.zeros(rows + cols + 64, dtype=np.int64)
+        self._path = np.zeros((2, rows + cols + 64), dtype=np.int64)
         self._scores = np.zeros(scene.regions)
         self._arrays = (
             forest.cell_of,
@@ -100,7 +100,7 @@ class IndexPlanner:
         options[:4, 0] = -1.0  # single moves are not among its options
         options[4:, 1] = scores
         return Decision(
-            cells_of(self._path[:length], cols),
+            cells_of(self._path, length),
             "elsewhere" if region == 0 else f"region {region}",
             float(scores[region]),
             Effort(0, time.perf_counter() - began),
@@ -111,4 +111,4 @@ class IndexPlanner:
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use, by making some on a small map."""
-        warm_up(IndexPlanner(fov=self._fov), self._fov, progress)
+        warm_up(lambda ground: IndexPlanner(fov=self._fov, flyable=ground), self._fov, progress)

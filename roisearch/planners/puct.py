@@ -71,7 +71,7 @@ class PuctPlanner:
         worth[1:] = np.arange(1, farthest, dtype=np.float64) ** (-1.0 / s.alpha)
         self._random = np.zeros(1, dtype=np.uint64)
         self._shown = np.zeros((actions, 2))
-        self._path = np.zeros(rows + cols + 64, dtype=np.int64)
+        self._path = np.zeros((2, rows + cols + 64), dtype=np.int64)
         self._arrays: tuple[Any, ...] = (
             forest.cell_of,
             forest.first,
@@ -166,8 +166,8 @@ class PuctPlanner:
             done += chunk
             if done == most or (deadline_s is not None and time.perf_counter() - began >= deadline_s):
                 break
-        path = cells_of(self._path[:length], cols)
-        if action >= 4:
+        path = cells_of(self._path, length)
+        if action >= 4 and self.settings.commit != "never":
             self._trip = _Trip(action, path, float(self._shown[action, 1]), belief.hits)
         else:
             self._trip = None
@@ -200,7 +200,11 @@ class PuctPlanner:
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use."""
-        warm_up(PuctPlanner(self.name, self.settings, fov=self._fov), self._fov, progress)
+        warm_up(
+            lambda ground: PuctPlanner(self.name, self.settings, fov=self._fov, flyable=ground),
+            self._fov,
+            progress,
+        )
 
 
 class _Trip:
@@ -214,7 +218,7 @@ class _Trip:
         self._next = 0
 
     def rest(self, cell: Cell, hits: int) -> tuple[Cell, ...]:
-        """What is left to fly from `cell`; nothing when it is over, left, or a hit has changed the picture."""
+        """What is left to fly from `cell`; nothing when it is over, left, or a hit has come since."""
         if hits != self._hits:
             return ()
         for place in range(self._next, len(self._path) - 1):

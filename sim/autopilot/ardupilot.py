@@ -84,6 +84,7 @@ class ArduCopter(Firmware):
     upload_retry_s, upload_timeout_s = 1.0, 8.0
     parameters_as_bits, tells_index_by_name, echoes_when_changed = False, False, 1
     serves_data_streams = True
+    reboot_refusal, pilot_mode = FAILED, "LOITER"
     target_fields = (M.MAV_FRAME_GLOBAL, 65016, False)
     cells = 3
     vtol_state = M.MAV_VTOL_STATE_MC
@@ -378,8 +379,11 @@ class ArduCopter(Firmware):
         seen = self.vehicle.seen
         outside = self.vehicle.flying and self._fence_on and self.breaches_fence(seen.north, seen.east)
         if outside and not self._breached:
-            self.vehicle.say(WARNING, "Polygon fence breached")
-            if int(self.parameters["FENCE_ACTION"]) == 1:
-                self.set_mode("RTL")
-                self.failsafe = True
+            self.on_breach(False)
         self._breached = outside
+
+    def on_breach(self, forced: bool) -> None:
+        self.vehicle.say(WARNING, "Polygon fence breached")
+        if forced or int(self.parameters["FENCE_ACTION"]) == 1:
+            self.set_mode("RTL")
+            self.failsafe = True

@@ -86,6 +86,7 @@ class Px4(Firmware):
     upload_retry_s, upload_timeout_s = 0.25, 5.0
     parameters_as_bits, tells_index_by_name, echoes_when_changed = True, True, 2
     serves_data_streams = False
+    reboot_refusal, pilot_mode = REJECTED, "POSCTL"
     target_fields = (M.MAV_FRAME_GLOBAL_INT, 0, True)
     cells = 4
     position_error_m, velocity_error_mps = 0.45, 0.06
@@ -304,17 +305,12 @@ class Px4(Firmware):
             vehicle.say(INFO, "Mission finished, loitering")
             self.set_mode("AUTO_LOITER", behaviour.holds)
         if self.mode == "OFFBOARD" and vehicle.armed and time - self._setpoint_at > self._setpoint_timeout:
-            self._fail("Failsafe activated", "POSCTL")
+            self.fail_to("POSCTL", "Failsafe activated")
         self._watch_sticks(time)
         self._watch_companion(time)
         self._watch_position(time)
         self._watch_battery()
         self._watch_fence()
-
-    def _fail(self, text: str, mode: str) -> None:
-        self.vehicle.say(CRITICAL, text)
-        self.set_mode(mode)
-        self.failsafe = True
 
     def _watch_sticks(self, time: float) -> None:
         timeout = max(self.parameters["COM_RC_LOSS_T"], self.link_floor_s) + 0.5
@@ -322,12 +318,12 @@ class Px4(Firmware):
         lost = self._sticks_held and not held
         self._sticks_held = held
         if lost and self.vehicle.flying and self.mode not in _NO_FAILSAFE and self.mode != "OFFBOARD":
-            self._fail("Failsafe activated: entering Hold for 5 seconds", "AUTO_LOITER")
+            self.fail_to("AUTO_LOITER", "Failsafe activated: entering Hold for 5 seconds")
             self._hold_until = time + 5.0
         if self._hold_until is not None and time >= self._hold_until:
             self._hold_until = None
             if self.failsafe and self.vehicle.flying:
-                self._fail("Failsafe activated", "AUTO_RTL")
+                self.fail_to("AUTO_RTL", "Failsafe activated")
 
     def _watch_companion(self, time: float) -> None:
         heard = self.companion_heard_at
@@ -338,7 +334,7 @@ class Px4(Firmware):
 
     def _watch_position(self, time: float) -> None:
         if self.vehicle.flying and not self.position_known and self.mode not in ("AUTO_LAND", "ALTCTL"):
-            self._fail("Failsafe activated", "AUTO_LAND")
+            self.fail_to("AUTO_LAND", "Failsafe activated")
 
     def _watch_battery(self) -> None:
         charge = self.vehicle.battery.charge
@@ -353,14 +349,18 @@ class Px4(Firmware):
             action = int(self.parameters["COM_LOW_BAT_ACT"])
             if action > 0 and self._low_said >= 2 and self.vehicle.flying:
                 lands = action == 2 or (action == 3 and self._low_said >= 3)
-                self._fail("Failsafe activated", "AUTO_LAND" if lands else "AUTO_RTL")
+                self.fail_to("AUTO_LAND" if lands else "AUTO_RTL", "Failsafe activated")
 
     def _watch_fence(self) -> None:
         vehicle = self.vehicle
         outside = vehicle.flying and self.breaches_fence(vehicle.seen.north, vehicle.seen.east)
         if outside and not self._breached:
-            vehicle.say(CRITICAL, "Geofence violation: approaching or outside geofence")
-            action = int(self.parameters["GF_ACTION"])
-            if action in (2, 3, 5):
-                self._fail("Failsafe activated", {2: "AUTO_LOITER", 3: "AUTO_RTL", 5: "AUTO_LAND"}[action])
+            self.on_breach(False)
         self._breached = outside
+
+    def on_breach(self, forced: bool) -> None:
+        self.vehicle.say(CRITICAL, "Geofence violation: approaching or outside geofence")
+        actions = {2: "AUTO_LOITER", 3: "AUTO_RTL", 5: "AUTO_LAND"}
+        mode = "AUTO_RTL" if forced else actions.get(int(self.parameters["GF_ACTION"]))
+        if mode is not None:
+            self.fail_to(mode, "Failsafe activated")

@@ -44,6 +44,7 @@ class Requests:
             M.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: lambda link, _: self._send(
                 link, M.MAVLINK_MSG_ID_AUTOPILOT_VERSION
             ),
+            M.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
             M.MAV_CMD_GET_HOME_POSITION: lambda link, _: self._send(link, M.MAVLINK_MSG_ID_HOME_POSITION),
         }
         self.message_handlers: dict[int, Callable[[Link, Any], None]] = {
@@ -83,6 +84,12 @@ class Requests:
     def _tell_interval(self, link: Link, number: int) -> Results:
         link.send(M.MAVLink_message_interval_message(number, link.interval_us(number)))
         return ACCEPTED
+
+    def _reboot(self, link: Link, command: Command) -> Results:
+        result = self._autopilot.firmware.on_reboot(command)
+        if result == ACCEPTED:
+            self._autopilot.faults.reboot_soon()
+        return result
 
     def _on_timesync(self, link: Link, message: Any) -> None:
         if message.tc1 == 0:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from sim.autopilot.behaviours import Behaviour, GoTo, Hold, Stand
-from sim.autopilot.commands import ACCEPTED, UNSUPPORTED, Command, Results
+from sim.autopilot.commands import ACCEPTED, UNSUPPORTED, Command, Results, whole
 from sim.autopilot.dialect import M
 from sim.autopilot.fence import Fence
 from sim.autopilot.motion import Limits
@@ -259,7 +259,7 @@ class Firmware(ABC):
         if command.param1 == 1.0 or place is None:
             vehicle.home = vehicle.seen
         else:
-            vehicle.home = Point(*vehicle.frame.from_e7(*place), command.z - vehicle.ground_amsl)
+            vehicle.home = Point(*vehicle.frame.from_e7(*place), self.up_of_amsl(command.z))
         return ACCEPTED
 
     def pilot(self, mode: str) -> None:
@@ -283,7 +283,12 @@ class Firmware(ABC):
 
     def on_set_current(self, command: Command) -> Results:
         """DO_SET_MISSION_CURRENT."""
-        return ACCEPTED if self.plan.select(int(command.param1)) else UNSUPPORTED
+        return ACCEPTED if self.plan.select(whole(command.param1)) else UNSUPPORTED
+
+    @property
+    def prearm_healthy(self) -> bool:
+        """The pre-arm bit of SYS_STATUS."""
+        return self.ready
 
     @property
     def position_known(self) -> bool:
@@ -328,6 +333,9 @@ class Firmware(ABC):
                 self.gps_lost_at = time
         else:
             self.gps_lost_at = None
+        if vehicle.battery.charge <= 0.0 and vehicle.flying:
+            vehicle.say(EMERGENCY, "Battery is empty")
+            self.disarm("Motors stopped", landed=False)
         self.ready = time >= self.settings.ready_after_s and self.position_known
         if vehicle.armed:
             self._watch_landing(time)
@@ -366,7 +374,7 @@ class Firmware(ABC):
 
     def up_of_amsl(self, altitude: float) -> float:
         """Height in the home frame of an altitude above mean sea level; NaN keeps the present height."""
-        if math.isnan(altitude):
+        if not math.isfinite(altitude):
             return self.target_or_seen().up
         return altitude - self.vehicle.ground_amsl
 

@@ -14,7 +14,7 @@ from sim.autopilot.behaviours import (
     Return,
     TakeOff,
 )
-from sim.autopilot.commands import ACCEPTED, REJECTED, UNSUPPORTED, Command, Result, Results
+from sim.autopilot.commands import ACCEPTED, REJECTED, UNSUPPORTED, Command, Result, Results, whole
 from sim.autopilot.dialect import M
 from sim.autopilot.firmware import CRITICAL, FORCE, INFO, Firmware
 from sim.autopilot.motion import Limits
@@ -170,10 +170,10 @@ class Px4(Firmware):
         super().set_mode(mode, behaviour)
 
     def on_set_mode(self, command: Command) -> Results:
-        if not int(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        if not whole(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return ACCEPTED + REJECTED
-        main = int(command.param2)
-        return ACCEPTED + self._enter(_custom(main, int(command.param3) if main == _MAIN["AUTO"] else 0))
+        main = whole(command.param2)
+        return ACCEPTED + self._enter(_custom(main, whole(command.param3) if main == _MAIN["AUTO"] else 0))
 
     def on_set_mode_message(self, custom_mode: int) -> Results:
         return self._enter(custom_mode)
@@ -217,7 +217,7 @@ class Px4(Firmware):
     def on_takeoff(self, command: Command) -> Results:
         vehicle = self.vehicle
         height = self.parameters["MIS_TAKEOFF_ALT"] + vehicle.seen.up
-        up = height if math.isnan(command.z) else command.z - vehicle.ground_amsl
+        up = command.z - vehicle.ground_amsl if math.isfinite(command.z) else height
         if vehicle.armed and up <= vehicle.seen.up:
             vehicle.say(CRITICAL, "Already higher than takeoff altitude")
             self._takeoff_up = None
@@ -235,7 +235,7 @@ class Px4(Firmware):
         return super().on_return(command)
 
     def on_reposition(self, command: Command) -> Results:
-        flags = 0 if math.isnan(command.param2) else int(command.param2)
+        flags = whole(command.param2)
         plain = flags == 1
         if not plain and self.mode != "AUTO_LOITER":
             return UNSUPPORTED
@@ -249,7 +249,7 @@ class Px4(Firmware):
             return result
         here = self.target_or_seen() if place is None else None
         north, east = (here.north, here.east) if here is not None else place or (0.0, 0.0)
-        yaw = None if math.isnan(command.param4) else math.degrees(command.param4) % 360.0
+        yaw = math.degrees(command.param4) % 360.0 if math.isfinite(command.param4) else None
         speed = command.param1 if command.param1 > 0 else None
         leg = GoTo(Point(north, east, self.up_of_amsl(command.z)), yaw=yaw, speed=speed, straight=True)
         self.failsafe = False

@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import signal
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -72,6 +73,7 @@ def parser() -> argparse.ArgumentParser:
         "--wind", type=_numbers(2), default=(0.0, 0.0), metavar="NORTH,EAST", help="m/s of the air"
     )
     p.add_argument("--gust", type=float, default=0.0, help="m/s, standard deviation of the gusts")
+    p.add_argument("--epoch", type=float, help="time of day at boot, seconds since 1970; default now")
     p.add_argument("--faults", type=Path, metavar="FILE", help="TOML file of faults")
     p.add_argument("--control", type=_host_port, metavar="HOST:PORT", help="control socket (loopback only)")
     return p
@@ -90,6 +92,7 @@ def settings_of(args: argparse.Namespace) -> Settings:
         endurance_s=args.endurance * 60.0,
         wind_mps=args.wind,
         gust_mps=args.gust,
+        epoch_s=time.time() if args.epoch is None else args.epoch,
     )
 
 

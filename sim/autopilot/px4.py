@@ -48,10 +48,10 @@ class Px4(Firmware):
     limits = Limits(
         cruise=4.9,
         accelerate=2.2,
-        brake=0.48,
+        brake=0.45,
         jerk=5.2,
         position_gain=2.2,
-        velocity_gain=1.3,
+        velocity_gain=1.15,
         lag=0.45,
         climb=2.9,
         descend=1.5,

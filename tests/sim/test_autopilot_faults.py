@@ -181,6 +181,43 @@ def test_low_and_critical_battery_are_told(flight: Flight) -> None:
     assert flight.said("Critical battery" if flight.px4 else "Battery 1 is critical")
 
 
+@pytest.mark.parametrize(
+    ("flavor", "parameter", "action"),
+    [("px4", "COM_LOW_BAT_ACT", 3.0), ("ardupilot", "BATT_FS_CRT_ACT", 2.0)],
+)
+def test_critical_battery_comes_home_when_the_parameter_says_so(
+    flavor: str, parameter: str, action: float
+) -> None:
+    flight = Flight(flavor)
+    flight.autopilot.firmware.parameters.set(parameter, action)
+    flight.fault("battery", percent=6.0)
+    flight.listen(2.0)
+    assert flight.mode == RETURN[flavor]
+
+
+def test_empty_battery_stops_the_motors(flight: Flight) -> None:
+    flight.fault("battery", percent=0.0)
+    flight.listen(6.0)
+    assert not flight.armed
+    assert flight.autopilot.vehicle.body.on_ground
+
+
+def test_pilot_who_flies_out_of_the_fence_is_brought_home(flight: Flight) -> None:
+    item = mav.MAVLink_mission_item_int_message
+    x, y = flight.point(0, 0)
+    corners = ((-2000, -2000), (-2000, 2000), (2000, 2000), (2000, -2000))
+    items = [item(1, 1, k, 0, 5001, 0, 1, 4, 0, 0, 0, x + a, y + b, 0, 1) for k, (a, b) in enumerate(corners)]
+    flight.autopilot.firmware.fence.load(items)
+    flight.autopilot.firmware.parameters.set(
+        "GF_ACTION" if flight.px4 else "FENCE_ACTION", 3 if flight.px4 else 1
+    )
+    flight.long(mav.MAV_CMD_DO_FENCE_ENABLE, 1)
+    flight.fault("pilot", pitch=1.0)
+    assert flight.wait(lambda: flight.mode == RETURN[flight.flavor], 30.0)
+    flight.listen(0.5)
+    assert any("fence" in text.lower() for text in flight.texts)
+
+
 def test_pilot_takes_the_mode_and_the_sticks(flight: Flight) -> None:
     before = flight.here
     flight.fault("pilot", pitch=1.0, seconds=15.0)

@@ -9,6 +9,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     # command: (module with main(arguments) -> exit code, one line of help)
     "autopilot": ("sim.autopilot.cli", "a mock PX4 or ArduPilot on a real socket"),
     "detector": ("sim.detector", "a simulated detector that follows the aircraft"),
+    "flights": ("sim.flights", "whole searches with the real service, counted"),
 }
 
 

@@ -1,0 +1,82 @@
+"""What goes into a planner and what comes out: where the drone is, and where it should go and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roisearch.fov import HEADINGS, heading_index
+
+Cell = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class SearchState:
+    """Where the drone is: its cell (row, col), and its heading, which is the direction of its last move."""
+
+    cell: Cell
+    heading: str = "north"
+
+    def __post_init__(self) -> None:
+        heading_index(self.heading)
+
+
+@dataclass(frozen=True, slots=True)
+class Alternative:
+    """One option that the planner had: its visits, its value, and the region it goes to (None for a move)."""
+
+    action: str
+    visits: int
+    value: float
+    region: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What the decision cost: iterations of the search, and seconds."""
+
+    iterations: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Decision:
+    """The cells to enter next, and why.
+
+    Attributes:
+        path: cells in order, each a neighbour of the last, the first a neighbour of the drone; never empty.
+        action: "north", "east", "south", "west", "region 3", "elsewhere" (outside all regions), or the
+            pattern's name for a planner that follows one.
+        value: what the planner expects of it, in its own measure; comparable within one planner only.
+        effort: iterations and seconds.
+        unreachable: probability of the cells that cannot be seen from where the drone can fly.
+        remark: one sentence for the operator when something is worth saying, else empty.
+        options: the root's visits and value by action, [actions, 2]; see `alternatives`.
+    """
+
+    path: tuple[Cell, ...]
+    action: str
+    value: float
+    effort: Effort
+    unreachable: float = 0.0
+    remark: str = ""
+    options: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)), repr=False)
+
+    @property
+    def alternatives(self) -> tuple[Alternative, ...]:
+        """Every option that was open to the planner, the best first by visits, then by value."""
+        rows = [
+            Alternative(action_name(i), int(visits), float(value), i - 4 if i > 4 else None)
+            for i, (visits, value) in enumerate(self.options)
+            if visits >= 0
+        ]
+        return tuple(sorted(rows, key=lambda row: (-row.visits, -row.value)))
+
+
+def action_name(action: int) -> str:
+    """The name of an action: 0-3 the moves, 4 the ground outside all regions, 4 + k region k."""
+    if action < 4:
+        return HEADINGS[action]
+    return "elsewhere" if action == 4 else f"region {action - 4}"

@@ -1,0 +1,77 @@
+"""Direct policy search: try many epsilon-greedy walks, keep the best."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roisearch.kernels.compiled import kernel
+from roisearch.kernels.ground import col_step, row_step
+from roisearch.kernels.records import Bits, Floats, Ints, Land, Mass, Sight
+from roisearch.kernels.rollouts import draw_move, draw_unit
+from roisearch.kernels.sensing import fade_at, gain_at, restore
+
+
+@kernel
+def search_policies(
+    cell: int,
+    heading: int,
+    rollouts: int,
+    horizon: int,
+    epsilon: float,
+    state: NDArray[np.uint64],
+    weights: Floats,
+    fade: Floats,
+    fades: bool,
+    log: Ints,
+    legal: Bits,
+    cols: int,
+    offsets: Ints,
+    gains: Floats,
+    miss: Floats,
+    is_point: bool,
+    trial: Ints,
+    path: Ints,
+) -> float:
+    """Direct policy search: the best of `rollouts` epsilon-greedy walks of `horizon` moves goes into `path`.
+
+    With probability epsilon a move is random, else it goes to the neighbour that sees most. Returns the sum
+    of the weights seen, which fade by 1 - p_tp within a walk when `fades`.
+    """
+    from_row, from_col = cell // cols, cell % cols
+    land = Land(legal, weights.size // cols, cols)
+    sight = Sight(offsets, gains, miss, is_point)
+    mass = Mass(weights, fade, fades, log)
+    best = -1.0
+    for _ in range(rollouts):
+        row, col, facing, logged, total = from_row, from_col, heading, 0, 0.0
+        for step in range(horizon):
+            allowed = legal[row * cols + col]
+            move = -1
+            if draw_unit(state) < epsilon:
+                move = draw_move(state)
+                while not allowed >> move & 1:
+                    move = draw_move(state)
+                gain = gain_at(row + row_step(move), col + col_step(move), move, land.rows, cols, mass, sight)
+            else:
+                gain = -1.0
+                for turn in range(4):
+                    there = (facing + (turn ^ (turn >> 1))) & 3
+                    if allowed >> there & 1:
+                        r, c = row + row_step(there), col + col_step(there)
+                        found = gain_at(r, c, there, land.rows, cols, mass, sight)
+                        if found > gain:
+                            move, gain = there, found
+            row += row_step(move)
+            col += col_step(move)
+            facing = move
+            total += gain
+            if fades:
+                logged = fade_at(row, col, facing, land.rows, cols, mass, sight, logged)
+            trial[step] = row * cols + col
+        restore(mass, logged)
+        if total > best:
+            best = total
+            for step in range(horizon):
+                path[step] = trial[step]
+    return best

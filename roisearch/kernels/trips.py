@@ -1,0 +1,63 @@
+"""Options step by step: the shortest way to a look at the goal, by the cells that see most."""
+
+from __future__ import annotations
+
+from roisearch.kernels.compiled import kernel
+from roisearch.kernels.ground import col_step, row_step, sees, steps_to
+from roisearch.kernels.records import FAR, Aims, Ints, Land, Mass, Sight
+from roisearch.kernels.sensing import gain_at
+
+
+@kernel
+def trip_move(
+    row: int, col: int, heading: int, region: int, land: Land, mass: Mass, sight: Sight, aims: Aims
+) -> tuple[int, bool]:
+    """The next move of the trip to the goal of `region`, and whether it ends there; (-1, False) if none.
+
+    The nearest way, and of equally near ones the one that sees most; of equal ones again straight on, right,
+    left, back, in this order.
+    """
+    goal_row, goal_col = aims.goals[region, 1], aims.goals[region, 2]
+    legal = land.legal[row * land.cols + col]
+    best, best_steps, best_gain = -1, FAR, -1.0
+    for turn in range(4):
+        move = (heading + (turn ^ (turn >> 1))) & 3
+        if not legal >> move & 1:
+            continue
+        near_row, near_col = row + row_step(move), col + col_step(move)
+        steps = 0
+        if not sees(near_row, near_col, move, goal_row, goal_col, sight):
+            steps = steps_to(near_row, near_col, region, land.cols, aims, sight)
+        if steps > best_steps or steps >= FAR:
+            continue
+        gain = gain_at(near_row, near_col, move, land.rows, land.cols, mass, sight)
+        if steps < best_steps or gain > best_gain:
+            best, best_steps, best_gain = move, steps, gain
+    return best, best_steps == 0
+
+
+@kernel
+def walk_trip(
+    row: int,
+    col: int,
+    heading: int,
+    region: int,
+    land: Land,
+    mass: Mass,
+    sight: Sight,
+    aims: Aims,
+    path: Ints,
+) -> int:
+    """Write the cells of the trip to the goal of `region` into `path`, as many as fit; how many there are."""
+    length = 0
+    arrived = False
+    while not arrived and length < path.size:
+        move, arrived = trip_move(row, col, heading, region, land, mass, sight, aims)
+        if move < 0:
+            break
+        row += row_step(move)
+        col += col_step(move)
+        heading = move
+        path[length] = row * land.cols + col
+        length += 1
+    return length

@@ -1,0 +1,224 @@
+"""PUCT over the flat MDP, the BMDP-O or the lite MDP-O: the object that plans."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from roisearch.belief import Belief
+from roisearch.decision import Cell, Decision, Effort, SearchState, action_name
+from roisearch.forest import ForestSums
+from roisearch.fov import FieldOfView, heading_index
+from roisearch.kernels.decide import decide
+from roisearch.planners.base import Progress, Scene, World, cells_of, remark_on
+from roisearch.planners.settings import PuctSettings
+from roisearch.planners.warm import warm_up
+from roisearch.regions import Regions
+
+_CHUNK = 32
+"""Iterations between two looks at the clock."""
+
+_MOST_NODES = 1 << 14
+"""Nodes of a tree whose size only the deadline limits; a full tree is searched on without growing."""
+
+
+class PuctPlanner:
+    """Plans by PUCT; see `PuctSettings`.
+
+    Args:
+        name: the planner's name in the registry.
+        fov: the field of view; its p_tp is used in the tree.
+        flyable: bool [rows, cols], None for everything.
+        regions: the regions of interest; segmented from the first belief unless given.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        settings: PuctSettings,
+        *,
+        fov: FieldOfView,
+        flyable: ArrayLike | None = None,
+        regions: Regions | None = None,
+    ) -> None:
+        self.name = name
+        self.settings = settings
+        self._fov = fov
+        self._world = World(fov, flyable, regions)
+        self._scene: Scene | None = None
+        self._trip: _Trip | None = None
+
+    def _enter(self, scene: Scene) -> None:
+        """Make room for everything that depends on the map."""
+        self._scene = scene
+        self._trip = None
+        s, fov = self.settings, self._fov
+        rows, cols = scene.ground.shape
+        cells = rows * cols
+        is_open = scene.ground.is_open
+        regions = scene.regions if s.options else 0
+        actions, k = 4 + regions, len(fov.p_tp)
+        nodes = 1 + min(s.iterations or _MOST_NODES, _MOST_NODES)
+        forest = scene.forest
+        roots = forest.root[:regions].copy()
+        if regions and not s.elsewhere:
+            roots[0] = -1
+        farthest = 8 + (rows + cols if is_open else cells)
+        worth = np.ones(farthest)
+        worth[1:] = np.arange(1, farthest, dtype=np.float64) ** (-1.0 / s.alpha)
+        self._random = np.zeros(1, dtype=np.uint64)
+        self._shown = np.zeros((actions, 2))
+        self._path = np.zeros(rows + cols + 64, dtype=np.int64)
+        self._arrays: tuple[Any, ...] = (
+            forest.cell_of,
+            forest.first,
+            forest.last,
+            forest.box,
+            roots,
+            np.maximum(forest.count[:regions], 1),
+            scene.part.legal,
+            cols,
+            fov.offsets,
+            fov.p_tp if s.gain == "detection" else np.ones(k),
+            1.0 - fov.p_tp,
+            fov.is_point,
+            fov.reach,
+            np.ones(cells if s.fades else 1),  # fade
+            s.fades,
+            np.zeros((s.rollout + 8 * (rows + cols)) * k, dtype=np.int64),  # log
+            np.full((regions, 3), -1, dtype=np.int64),  # goals
+            np.zeros((regions, 4 * k, 3), dtype=np.int64),  # sources
+            np.zeros(regions, dtype=np.int64),  # counts
+            np.zeros(regions),  # means
+            scene.centroids[:regions],
+            np.zeros((0 if is_open else regions, cells), dtype=np.int32),  # fields
+            np.full(regions, -1, dtype=np.int64),  # field_goals
+            np.zeros(0 if is_open else cells, dtype=np.int32),  # forward
+            np.zeros(0 if is_open else cells, dtype=np.int64),  # queue
+            np.zeros(144, dtype=np.int64),  # stack: at most 15 siblings a level, 16 ** 9 cells
+            worth,
+            s.code("goal"),
+            s.code("choose"),
+            s.margin,
+            s.rollout,
+            s.code("rollout_policy"),
+            s.code("option_reward"),
+            s.code("backup"),
+            s.normalise,
+            s.code("prior"),
+            s.explore,
+            s.discount,
+            1.0 / cells if s.penalty is None else s.penalty,
+            s.factor / s.area**2,
+            s.alpha,
+            s.floor,
+            np.zeros((nodes, actions), dtype=np.int32),  # child
+            np.zeros((nodes, 5, actions)),  # stats
+            np.zeros(nodes),  # visits
+            np.zeros((s.depth, 4)),  # trail
+            np.zeros(2),  # span
+            np.cumprod(np.concatenate(([1.0], np.full(farthest, s.discount)))),  # decay
+            self._shown,
+            self._path,
+        )
+
+    def plan(
+        self,
+        belief: Belief,
+        state: SearchState,
+        rng: np.random.Generator,
+        *,
+        deadline_s: float | None = None,
+    ) -> Decision:
+        """Where to go next: see `Planner.plan`."""
+        began = time.perf_counter()
+        scene = self._world.scene(belief, state.cell)
+        if scene is not self._scene:
+            self._enter(scene)
+        sums = belief.sums_of(scene.forest)
+        held = -1
+        if self._trip is not None:
+            rest = self._trip.rest(state.cell, belief.hits)
+            if rest and self.settings.commit == "trip":
+                return self._go_on(belief, scene, sums, self._trip, rest, began)
+            if rest and self.settings.commit == "margin":
+                held = self._trip.action
+        self._random[0] = rng.bit_generator.random_raw()
+        row, col = state.cell
+        cols = scene.ground.shape[1]
+        at, heading = row * cols + col, heading_index(state.heading)
+        scale = 1.0 / belief.total
+        most = self.settings.iterations
+        if most is None and deadline_s is None:
+            raise ValueError("a planner without a number of iterations needs a deadline")
+        done, nodes = 0, 0
+        while True:
+            chunk = _CHUNK if most is None else most - done
+            if deadline_s is not None:
+                chunk = min(chunk, _CHUNK)
+            nodes, action, length = decide(
+                at, heading, nodes, chunk, held, scale, self._random, belief.weights, sums.sums, sums.peaks,
+                *self._arrays,
+            )  # fmt: skip
+            done += chunk
+            if done == most or (deadline_s is not None and time.perf_counter() - began >= deadline_s):
+                break
+        path = cells_of(self._path[:length], cols)
+        if action >= 4:
+            self._trip = _Trip(action, path, float(self._shown[action, 1]), belief.hits)
+        else:
+            self._trip = None
+        unreachable = scene.unreachable(belief, sums)
+        return Decision(
+            path,
+            action_name(action),
+            float(self._shown[action, 1]),
+            Effort(done, time.perf_counter() - began),
+            unreachable,
+            remark_on(unreachable),
+            self._shown.copy(),
+        )
+
+    def _go_on(
+        self,
+        belief: Belief,
+        scene: Scene,
+        sums: ForestSums,
+        trip: _Trip,
+        rest: tuple[Cell, ...],
+        began: float,
+    ) -> Decision:
+        """The rest of the trip that the planner is committed to."""
+        unreachable = scene.unreachable(belief, sums)
+        effort = Effort(0, time.perf_counter() - began)
+        return Decision(
+            rest, action_name(trip.action), trip.value, effort, unreachable, remark_on(unreachable)
+        )
+
+    def warm_up(self, progress: Progress | None = None) -> None:
+        """Compile every kernel that a decision and an observation use."""
+        warm_up(PuctPlanner(self.name, self.settings, fov=self._fov), self._fov, progress)
+
+
+class _Trip:
+    """An option under way: its action, its cells, what it was worth, and the hits seen before it began."""
+
+    def __init__(self, action: int, path: tuple[Cell, ...], value: float, hits: int) -> None:
+        self.action = action
+        self.value = value
+        self._path = path
+        self._hits = hits
+        self._next = 0
+
+    def rest(self, cell: Cell, hits: int) -> tuple[Cell, ...]:
+        """What is left to fly from `cell`; nothing when it is over, left, or a hit has changed the picture."""
+        if hits != self._hits:
+            return ()
+        for place in range(self._next, len(self._path) - 1):
+            if self._path[place] == cell:
+                self._next = place
+                return self._path[place + 1 :]
+        return ()

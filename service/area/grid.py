@@ -1,0 +1,252 @@
+"""The grid that the search runs on: prior, searchable and flyable cells, launch point."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+from scipy import ndimage
+
+from service.area import route
+from service.area.frame import BoolArray, GridFrame, lay_frame
+from service.area.geojson import Where
+from service.area.model import LatLon, SearchArea
+from service.area.prior import area_prior, cell_squares, covered_fraction
+from service.area.projection import FloatArray, surface_m2
+from service.area.reading import check_launch
+from service.area.route import KeepOut
+from service.errors import BadInput
+
+Array = TypeVar("Array", FloatArray, BoolArray)
+
+CLEARANCE_M = 5.0
+"""How far the aircraft keeps from an exclusion, in metres: position error and overshoot at a waypoint."""
+
+_SLIVER = 1e-6
+"""Less than this part of a cell is rounding, not ground."""
+
+_NO_MASS = 1e-9
+"""A cell with less prior than this will not be searched before the battery ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """What the planner and the mission need to know about the area. The arrays are read-only.
+
+    Attributes:
+        frame: cells to positions and back.
+        prior: float [rows, cols], summing to 1, zero where not searchable; before `outside`.
+        searchable: bool [rows, cols], cells that hold ground where the target may be.
+        flyable: bool [rows, cols], cells that the aircraft may be in: one connected part.
+        covered: float [rows, cols], how much of each cell is ground that is searched, 0..1.
+        outside: probability that the target is not in the area at all.
+        launch: (latitude, longitude) where the search starts and ends.
+        start: the flyable cell (row, col) nearest to the launch point.
+        keep_out: the exclusions on the plane, for `leg_is_clear` and `way_home`.
+        layout_notes: what the operator should know about the layout; see `notes`.
+    """
+
+    frame: GridFrame
+    prior: FloatArray
+    searchable: BoolArray
+    flyable: BoolArray
+    covered: FloatArray
+    outside: float
+    launch: LatLon
+    start: tuple[int, int]
+    keep_out: KeepOut
+    layout_notes: tuple[str, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences that the operator should read before the flight."""
+        return self.layout_notes + _prior_notes(self.prior, self.searchable, self.flyable)
+
+    @property
+    def reachable_mass(self) -> float:
+        """The share of the prior in flyable cells: what a footprint of one cell can ever find."""
+        return float(self.prior[self.flyable].sum())
+
+    def with_prior(self, prior: ArrayLike) -> "Grid":
+        """The same grid with another prior [rows, cols], such as one from a GeoTIFF; scaled to sum to 1.
+
+        Raises:
+            BadInput: no mass on searchable cells.
+        """
+        mass = np.where(self.searchable, np.asarray(prior, dtype=np.float64), 0.0)
+        if not mass.sum() > 0:
+            raise BadInput(
+                "the prior has no mass on any cell that is searched; give one that covers the area."
+            )
+        return replace(self, prior=_frozen(mass / mass.sum()))
+
+
+def build_grid(
+    area: SearchArea,
+    cell_m: float,
+    *,
+    margin_m: float | None = None,
+    clearance_m: float = CLEARANCE_M,
+    launch: LatLon | None = None,
+    max_cells: int = 1_000_000,
+) -> Grid:
+    """Lay cells over an area.
+
+    A cell is searchable when it holds any ground that is searched. It is flyable when its
+    centre lies in the area grown by `margin_m` and its square keeps `clearance_m` from every
+    exclusion; of several separate parts only one is flyable: the one with the most prior
+    mass that the launch point can reach. The strip of a searchable cell beside an exclusion
+    stays searchable, though its cell may not be flown over: a footprint wider than a cell
+    sees it, and with a footprint of one cell the belief honestly keeps its mass.
+
+    Args:
+        area: the checked area file.
+        cell_m: the side of a cell in metres.
+        margin_m: how far outside the area a cell's centre may be flown over, in metres; None
+            is half a cell's diagonal, just enough that every searchable cell is flyable.
+        clearance_m: the distance to keep from exclusions, in metres.
+        launch: (latitude, longitude) to use instead of the launch point of the file, such as
+            the aircraft's home; it may be as far from the area as one in the file.
+        max_cells: the largest grid, rows x cols.
+
+    Raises:
+        BadInput: cells too small or too large for the area, nothing left to fly over, or the
+            launch point is in or behind an exclusion.
+    """
+    where = Where(area.source)
+    _check_cell(area, cell_m, where)
+    if launch is not None:
+        check_launch(replace(area, launch=launch), where)
+    half_diagonal = cell_m * math.sqrt(0.5) + 1e-6
+    margin = half_diagonal if margin_m is None else margin_m
+    if not (math.isfinite(margin) and margin >= 0):
+        raise where.bad(f"the flight margin is {margin:g} m; give 0 or more metres")
+    frame = lay_frame(area.polygon, cell_m, extra_m=0.0 if margin_m is None else margin)
+    if frame.rows * frame.cols > max_cells:
+        raise where.bad(
+            f"cells of {cell_m:g} m make a grid of {frame.rows} x {frame.cols} cells, "
+            f"more than {max_cells}; take larger cells or a smaller area"
+        )
+    squares = cell_squares(frame)
+    covered = covered_fraction(squares, frame.flatten(area.ground))
+    searchable = covered > _SLIVER
+    if not searchable.any():
+        raise where.bad(f"the area is too small for one cell of {cell_m:g} m; take smaller cells")
+    prior = area_prior(area, frame, squares, covered, searchable)
+
+    blocked = route.keep_out(frame, area.exclusions, clearance_m)
+    centres = shapely.centroid(squares)
+    allowed = shapely.dwithin(frame.flatten(area.polygon), centres, margin)
+    allowed &= ~shapely.intersects(blocked.zone, squares)
+    if not allowed.any():
+        raise where.bad(f"the exclusions leave no cell of {cell_m:g} m to fly over; make them smaller")
+    chosen = launch or area.launch
+    flyable, home, notes = _reachable_part(frame, allowed, prior, blocked, chosen, where)
+    return Grid(
+        frame=frame,
+        prior=_frozen(prior),
+        searchable=_frozen(searchable),
+        flyable=_frozen(flyable),
+        covered=_frozen(covered),
+        outside=area.outside,
+        launch=home,
+        start=nearest_flyable(frame, flyable, home),
+        keep_out=blocked,
+        layout_notes=notes,
+    )
+
+
+def nearest_flyable(frame: GridFrame, flyable: BoolArray, latlon: LatLon) -> tuple[int, int]:
+    """The flyable cell (row, col) whose centre is nearest to a position."""
+    cells = np.argwhere(flyable)
+    east, south = frame.to_metres([latlon])[0] / frame.cell_m - 0.5
+    row, col = cells[np.argmin((cells[:, 0] - south) ** 2 + (cells[:, 1] - east) ** 2)]
+    return int(row), int(col)
+
+
+def leg_is_clear(grid: Grid, start: LatLon, end: LatLon) -> bool:
+    """Whether the straight leg between two (latitude, longitude) stays clear of every exclusion."""
+    return route.leg_is_clear(grid.frame, grid.keep_out, start, end)
+
+
+def way_home(grid: Grid, start: LatLon, end: LatLon) -> list[LatLon]:
+    """The shortest route between two (latitude, longitude) around the exclusions; see `route.way`.
+
+    Raises:
+        BadInput: an exclusion closes every way.
+    """
+    return route.way(grid.frame, grid.keep_out, start, end)
+
+
+def _check_cell(area: SearchArea, cell_m: float, where: Where) -> None:
+    if not (math.isfinite(cell_m) and cell_m > 0):
+        raise where.bad(f"the cell size is {cell_m:g} m; give a length greater than 0")
+    surface = surface_m2(area.polygon)
+    if surface < cell_m**2:
+        raise where.bad(
+            f"the area of {surface:.3g} m² is too small for one cell of {cell_m:g} m; "
+            "take smaller cells or draw a larger area"
+        )
+
+
+def _reachable_part(
+    frame: GridFrame,
+    allowed: BoolArray,
+    prior: FloatArray,
+    blocked: KeepOut,
+    launch: LatLon | None,
+    where: Where,
+) -> tuple[BoolArray, LatLon, tuple[str, ...]]:
+    """One connected part (4 neighbours) of the allowed cells, the launch point, and what to tell about it."""
+    labels, count = ndimage.label(allowed)
+    mass = ndimage.sum_labels(prior, labels, np.arange(1, count + 1))
+    size = ndimage.sum_labels(allowed, labels, np.arange(1, count + 1))
+    best_first = np.lexsort((-size, -mass)) + 1
+    notes: tuple[str, ...] = ()
+    part = labels == best_first[0]
+    if launch is None:
+        cell = np.argwhere(part)[-1]
+        lat, lon = frame.to_latlon([cell])[0]
+        launch = (float(lat), float(lon))
+        notes += (f"The area file has no launch point; the search starts from {lat:.6f}, {lon:.6f}.",)
+    else:
+        home = frame.to_metres([launch])[0]
+        if shapely.intersects_xy(blocked.zone, *home):
+            raise where.bad("the launch point lies in an exclusion or too near to one; move it away")
+        for label in best_first:
+            part = labels == label
+            entry = frame.to_metres(frame.to_latlon([nearest_flyable(frame, part, launch)]))[0]
+            if route.shortest_route(blocked, home, entry) is not None:
+                break
+        else:
+            raise where.bad(
+                "the launch point cannot reach the area without crossing an exclusion; move it or leave a gap"
+            )
+    if count > 1:
+        lost = 100 * float(prior[allowed & ~part].sum())
+        notes += (
+            f"The cells that may be flown over fall into {count} separate parts; only the one with "
+            f"{100 * float(prior[part].sum()):.3g} % of the prior is flown, {lost:.3g} % lies in the others.",
+        )
+    return part, launch, notes
+
+
+def _prior_notes(prior: FloatArray, searchable: BoolArray, flyable: BoolArray) -> tuple[str, ...]:
+    notes: tuple[str, ...] = ()
+    unseen = 100 * float(prior[~flyable].sum())
+    if unseen >= 0.05:
+        notes += (
+            f"{unseen:.3g} % of the prior lies in cells that may not be flown over; "
+            "only a footprint wider than one cell can look there.",
+        )
+    empty = int((searchable & (prior < _NO_MASS)).sum())
+    if empty:
+        notes += (f"{empty} of {int(searchable.sum())} searchable cells have no prior mass.",)
+    return notes
+
+
+def _frozen(array: Array) -> Array:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,187 @@
+"""The settings of a run: one TOML file, overridden by the environment, overridden by flags.
+
+Every key with its unit, default and meaning stands in `config/service.toml`; a test keeps the two alike.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from service.errors import BadInput
+
+PlannerName = Literal[
+    "puct-regions-lite",
+    "puct-regions",
+    "puct",
+    "greedy",
+    "direct-policy-search",
+    "coverage",
+    "spiral",
+    "index",
+]
+
+
+MOCK_SPEEDUP = 20.0
+
+
+class Section(BaseModel):
+    """A table of the file: unknown keys are refused, values never change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class LinkSettings(Section):
+    connect: str = ""
+    system_id: int = Field(default=0, ge=0, le=255)
+    silent_after_s: float = Field(default=3.0, gt=0.5, le=60)
+    connect_timeout_s: float = Field(default=120.0, gt=0)
+    speedup: float | None = Field(default=None, ge=1, le=100)
+
+
+class FlightSettings(Section):
+    altitude_m: float = Field(default=30.0, ge=5, le=500)
+    speed_mps: float = Field(default=8.0, ge=1, le=25)
+    deceleration_mps2: float = Field(default=1.5, gt=0.2, le=10)
+    corner_m: float = Field(default=5.0, ge=1, le=50)
+    takeoff: bool = False
+    min_battery_percent: float = Field(default=20.0, ge=0, le=95)
+    max_flight_s: float = Field(default=7200.0, gt=0)
+    max_launch_distance_m: float = Field(default=20_000.0, gt=0)
+
+
+class SensorSettings(Section):
+    profile: Literal["point", "donut", "wide-angle"] = "point"
+    horizontal_fov_deg: float = Field(default=62.0, gt=5, lt=170)
+    vertical_fov_deg: float = Field(default=55.0, gt=5, lt=170)
+    overlap: float = Field(default=0.2, ge=0, lt=0.9)
+    cell_m: float | None = Field(default=None, gt=0.5, le=1000)
+    p_tp: float = Field(default=0.9, gt=0, lt=1)
+    p_tn: float = Field(default=0.9, gt=0, lt=1)
+    min_covered: float = Field(default=0.8, gt=0, le=1)
+    silent_after_s: float = Field(default=10.0, gt=0)
+
+
+class SearchSettings(Section):
+    planner: PlannerName = "puct-regions-lite"
+    deadline_s: float = Field(default=0.038, gt=0, le=5)
+    found_at: float = Field(default=0.999, gt=0.5, lt=1)
+    stop_at_pos: float = Field(default=0.999, gt=0, lt=1)
+    max_area_km2: float = Field(default=100.0, gt=0)
+    max_steps: int = Field(default=40_000, gt=0)
+
+
+class HttpSettings(Section):
+    listen: str = "127.0.0.1:8080"
+    token_file: str = ""
+
+
+class RunSettings(Section):
+    folder: str = "runs"
+    seed: int = Field(default=1, ge=0)
+
+
+class DemoSettings(Section):
+    flavor: Literal["px4", "ardupilot"] = "px4"
+    endurance_min: float = Field(default=120.0, gt=0)
+
+
+class Settings(Section):
+    """All settings of a run; see `config/service.toml` for the meaning of each key."""
+
+    link: LinkSettings = LinkSettings()
+    flight: FlightSettings = FlightSettings()
+    sensor: SensorSettings = SensorSettings()
+    search: SearchSettings = SearchSettings()
+    http: HttpSettings = HttpSettings()
+    run: RunSettings = RunSettings()
+    demo: DemoSettings = DemoSettings()
+
+    @property
+    def mock(self) -> bool:
+        """True when the built-in mock flies, because no link was given."""
+        return not self.link.connect
+
+    @property
+    def speedup(self) -> float:
+        """How much faster than real time the aircraft's clock runs; 1 on a link unless a simulator's is given."""
+        return self.link.speedup or (MOCK_SPEEDUP if self.mock else 1.0)
+
+
+def _flatten(model: type[BaseModel]) -> dict[str, Any]:
+    """Every known key as 'section.key' with its annotation."""
+    return {
+        f"{section}.{key}": field.annotation
+        for section, table in model.model_fields.items()
+        for key, field in table.annotation.model_fields.items()  # type: ignore[union-attr]
+    }
+
+
+KNOWN_KEYS: tuple[str, ...] = tuple(_flatten(Settings))
+
+
+def _complaint(error: ValidationError, where: str) -> BadInput:
+    """The first problem pydantic found, as one sentence that names the key and what is allowed."""
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        known = KNOWN_KEYS if "." in key else tuple(Settings.model_fields)
+        near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
+        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
+        return BadInput(f"{where}: there is no setting '{key}'; {hint}")
+    return BadInput(f"{where}: '{key}' = {first['input']!r} is not possible: {first['msg']}")
+
+
+def read_settings(
+    file: Path | None = None,
+    *,
+    environment: Mapping[str, str] | None = None,
+    flags: Mapping[str, Any] | None = None,
+) -> Settings:
+    """Settings from defaults, then `file`, then ROISEARCH_SECTION_KEY variables, then `flags`.
+
+    `flags` maps 'section.key' to a value; None means 'not given'. Raises BadInput in one sentence.
+    """
+    values: dict[str, dict[str, Any]] = {}
+    where = "settings"
+    if file is not None:
+        where = str(file)
+        try:
+            values = tomllib.loads(file.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise BadInput(
+                f"{file}: cannot be read ({error.strerror}); give an existing TOML file"
+            ) from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise BadInput(f"{file}: is not TOML: {error}") from error
+        _check(values, where)
+    variables = os.environ if environment is None else environment
+    for dotted in KNOWN_KEYS:
+        section, key = dotted.split(".")
+        name = f"ROISEARCH_{section}_{key}".upper()
+        if name in variables:
+            values.setdefault(section, {})[key] = variables[name]
+            where = f"environment variable {name}"
+            _check(values, where)
+    for dotted, value in (flags or {}).items():
+        if value is not None:
+            section, key = dotted.split(".")
+            values.setdefault(section, {})[key] = value
+            _check(values, f"--{key.replace('_', '-')}")
+    settings = _check(values, where)
+    if settings.link.speedup not in (None, 1.0) and settings.link.connect.startswith("serial"):
+        raise BadInput(f"{settings.link.connect} is a real aircraft: it flies at a speedup of 1")
+    return settings
+
+
+def _check(values: dict[str, Any], where: str) -> Settings:
+    try:
+        return Settings.model_validate(values)
+    except ValidationError as error:
+        raise _complaint(error, where) from error

@@ -1,0 +1,1 @@
+"""What differs between autopilots, one small class each."""

@@ -1,0 +1,430 @@
+"""The vehicle as the rest of the service sees it: the core, a wire, and things to wait for.
+
+    async with Vehicle.open("udpin://0.0.0.0:14540", clock=clock, settings=LinkSettings()) as vehicle:
+        await vehicle.connect(30.0)
+        await vehicle.enter_guided()  # an order: the aircraft is ours to move until its pilot takes it
+        vehicle.reposition(47.3977, 8.5456, 520.0)
+        async for event in vehicle.events():
+            ...
+
+Waiting is done here, deciding in the core. Before anything that moves the aircraft is sent, everything that
+the wire has is read first, so that the decision is taken on the last heartbeat there is, not on the last one
+that the event loop got round to.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from typing import TypeVar
+
+from service.clock import Clock
+from service.mavlink.autopilots.base import Autopilot
+from service.mavlink.command import Command
+from service.mavlink.core import LinkCore
+from service.mavlink.errors import CommandFailed, NotPermitted, NoVehicle
+from service.mavlink.events import Accepted, Cancelled, CommandDone, Outcome, Refused, Target, VehicleEvent
+from service.mavlink.history import Pose, PoseHistory
+from service.mavlink.settings import LinkSettings
+from service.mavlink.telemetry import Telemetry
+from service.mavlink.transports import Transport, make_transport
+from service.mavlink.url import parse_url
+
+_T = TypeVar("_T")
+_TICK_S = 0.05
+_SHORTEST_TICK_WALL_S = 0.005
+_PATIENCE_WALL_S = 1.0
+_MODE_S = 6.0
+_COMPLAINT_S = 0.3
+_CLIMB_START_S = 20.0
+_CLIMB_MPS = 0.7
+_SEVERITY_INFO = 6
+_SEVERITY_WARNING = 4
+
+
+class Vehicle:
+    """One aircraft on one link. Made by `Vehicle.open`."""
+
+    def __init__(self, transport: Transport, clock: Clock, settings: LinkSettings) -> None:
+        self.settings = settings.for_speedup(clock.speedup)
+        self._clock = clock
+        self._transport = transport
+        self._core = LinkCore(self.settings, speaks_first=transport.speaks_first)
+        self._queue: asyncio.Queue[VehicleEvent | None] = asyncio.Queue()
+        self._changed = asyncio.Event()
+        self._waiting: dict[int, asyncio.Future[Outcome]] = {}
+
+    @classmethod
+    @contextlib.asynccontextmanager
+    async def open(
+        cls, url: str, *, clock: Clock, settings: LinkSettings | None = None
+    ) -> AsyncIterator[Vehicle]:
+        """Open the link and keep it up for as long as the block lasts.
+
+        Raises:
+            BadInput: the address cannot be used.
+            LinkError: the port or device cannot be opened.
+        """
+        transport = make_transport(parse_url(url))
+        await transport.open()
+        vehicle = cls(transport, clock, settings or LinkSettings())
+        failure: Exception | None = None
+        try:
+            async with asyncio.TaskGroup() as group:
+                tasks = [
+                    group.create_task(transport.run(vehicle._pump), name="mavlink wire"),
+                    group.create_task(vehicle._tick_for_ever(), name="mavlink tick"),
+                ]
+                try:
+                    yield vehicle
+                except Exception as error:  # leaves as it is, not wrapped into the group of our tasks' errors
+                    failure = error
+                finally:
+                    for task in tasks:
+                        task.cancel()
+        finally:
+            transport.close()
+            vehicle._queue.put_nowait(None)
+        if failure is not None:
+            raise failure
+
+    # ---- what is known
+
+    @property
+    def address(self) -> str:
+        """The link's address, with the port in use."""
+        return self._transport.address
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """The last that the vehicle has said."""
+        return self._core.telemetry
+
+    @property
+    def history(self) -> PoseHistory:
+        """Where it has been."""
+        return self._core.history
+
+    @property
+    def autopilot(self) -> Autopilot | None:
+        """Its kind, once it has been heard."""
+        return self._core.autopilot
+
+    @property
+    def in_control(self) -> bool:
+        """Whether it is ours to move."""
+        return self._core.in_control
+
+    @property
+    def target(self) -> Target | None:
+        """The last target sent, unless it was given up."""
+        return self._core.target
+
+    def pose_at(self, time: float) -> Pose | None:
+        """Where it was at a time of the service's clock, or None if that is not known."""
+        return self._core.history.pose_at(time)
+
+    def why_not_reposition(self) -> str | None:
+        """Why `reposition` would refuse now, as a sentence's end, or None."""
+        return self._core.why_not_reposition(self._clock.now())
+
+    async def events(self) -> AsyncIterator[VehicleEvent]:
+        """Everything that happens, in order, from the opening of the link on; ends when the link is closed.
+
+        There is one stream of events, for one reader.
+        """
+        while (event := await self._queue.get()) is not None:
+            yield event
+
+    async def wait_until(self, condition: Callable[[Telemetry], bool], timeout_s: float) -> bool:
+        """Wait until what is known fulfils a condition; False if it did not in time."""
+        return await self._until(lambda: condition(self._core.telemetry) or None, timeout_s) is not None
+
+    # ---- waiting for a vehicle
+
+    async def connect(self, timeout_s: float) -> Telemetry:
+        """Wait for a vehicle and its first position.
+
+        Raises:
+            NoVehicle: none was heard in time, or not one that can be flown.
+        """
+        if await self.wait_until(lambda t: self._core.paired and t.position_known, timeout_s):
+            return self.telemetry
+        core, where = self._core, self._transport.address
+        if core.autopilot is not None:
+            raise NoVehicle(
+                f"system {core.telemetry.system_id} ({core.autopilot.title}) is heard on {where} "
+                f"but has sent no position in {timeout_s:g} s; it may have no GPS fix yet"
+            )
+        if core.rejected:
+            raise NoVehicle(f"the only autopilot heard on {where} cannot be flown: {core.rejected}")
+        if core.messages_received:
+            raise NoVehicle(f"MAVLink is heard on {where}, but no autopilot's heartbeat in {timeout_s:g} s")
+        if core.bytes_received:
+            raise NoVehicle(f"bytes arrive on {where}, but they are not MAVLink; is the baud rate right?")
+        raise NoVehicle(f"nothing was heard on {where} in {timeout_s:g} s")
+
+    async def wait_ready(self, timeout_s: float) -> None:
+        """Wait until the vehicle can be armed.
+
+        Raises:
+            CommandFailed: it could not in time; the message has what it complained about.
+        """
+        since = self._clock.now()
+        if not await self.wait_until(lambda t: t.ready_to_arm, timeout_s):
+            t = self.telemetry
+            missing = [
+                name
+                for name, there in (
+                    ("a healthy pre-arm check", t.prearm_ok),
+                    ("a 3D fix", t.fix >= 3),
+                    ("a home position", t.home is not None),
+                )
+                if not there
+            ]
+            lacks = ", ".join(missing) or "a pre-arm check that stays healthy"
+            lacks += self._complaint(since)
+            raise CommandFailed(f"the vehicle is not ready to arm after {timeout_s:g} s: it lacks {lacks}")
+
+    # ---- orders of an operator
+
+    async def enter_guided(self) -> None:
+        """On an operator's order: enter the guided mode if need be, and take control.
+
+        Raises:
+            NotPermitted: the vehicle is not heard.
+            CommandFailed: it does not enter the mode.
+        """
+        self._pump()
+        if not self.telemetry.guided:
+            autopilot = self._need_autopilot()
+            await self._reach(autopilot.set_mode(autopilot.guided_mode), autopilot.guided_mode, ordered=True)
+        self._core.take_control(self._clock.now())
+
+    async def arm(self) -> None:
+        """On an operator's order, on the ground: enter the guided mode, take control and arm.
+
+        Raises:
+            NotPermitted: arming is not allowed to this process, or the vehicle is not ready.
+            CommandFailed: it does not arm.
+        """
+        self._pump()
+        if not self.settings.allow_arming:
+            raise NotPermitted("this service was not allowed to arm or take off (--takeoff)")
+        if self.telemetry.armed:
+            return
+        if not self.telemetry.ready_to_arm:
+            raise NotPermitted("the vehicle was not armed: it is not ready")
+        if not self.in_control:
+            await self.enter_guided()
+        autopilot, since = self._need_autopilot(), self._clock.now()
+        outcome = await self._ask(autopilot.arm())
+        if not await self.wait_until(lambda t: t.armed, self._patience(3.0)):
+            raise CommandFailed(f"the vehicle did not arm: {await self._explain(outcome, since)}")
+
+    async def take_off(self, height_m: float) -> None:
+        """Climb to a height above home, armed and in our control; returns when up there in the guided mode.
+
+        Raises:
+            NotPermitted: not armed, not on the ground, not in our control, or not allowed to this process.
+            CommandFailed: it did not get there; whatever it does then, it does by itself.
+        """
+        self._pump()
+        autopilot, t, since = self._need_autopilot(), self.telemetry, self._clock.now()
+        if not 1.0 <= height_m <= self.settings.max_height_change_m:
+            limit = self.settings.max_height_change_m
+            raise NotPermitted(
+                f"no take-off to {height_m} m: between 1 and {limit:g} m above home is possible"
+            )
+        if not t.armed or t.landed_state != "on_ground":
+            state = "armed" if t.armed else "not armed"
+            raise NotPermitted(f"no take-off: the vehicle is {state} and says {t.landed_state!r}")
+        command = autopilot.take_off(height_m, t.home_alt_amsl_m)
+        outcome = await self._ask(command)
+        if not isinstance(outcome, Accepted) and not self._climbing():
+            raise CommandFailed(f"the vehicle did not take off: {await self._explain(outcome, since)}")
+
+        def ended() -> str | None:
+            t = self.telemetry
+            if not t.in_control:
+                return t.control_reason
+            up = t.landed_state == "in_air" and t.alt_home_m >= height_m - max(0.1 * height_m, 1.0)
+            return "up" if up and t.guided else None
+
+        result = await self._until(ended, self._patience(_CLIMB_START_S + height_m / _CLIMB_MPS))
+        if result != "up":
+            t = self.telemetry
+            why = result or f"it is at {t.alt_home_m:.1f} m and says {t.landed_state!r}, mode {t.mode}"
+            raise CommandFailed(f"the take-off to {height_m:g} m did not end: {why}{self._complaint(since)}")
+
+    async def return_to_launch(self, *, ordered: bool = False) -> None:
+        """Fly home and land there.
+
+        Args:
+            ordered: an operator has just ordered it, so it may be taken from the pilot's hands.
+
+        Raises:
+            NotPermitted, CommandFailed: the heartbeat does not show the mode.
+        """
+        autopilot = self._need_autopilot()
+        await self._go(autopilot.return_to_launch(), autopilot.return_mode, ordered=ordered)
+
+    async def land(self, *, ordered: bool = False) -> None:
+        """Land here. Arguments and errors as for `return_to_launch`."""
+        autopilot = self._need_autopilot()
+        await self._go(autopilot.land(), autopilot.land_mode, ordered=ordered)
+
+    # ---- the search's own steps
+
+    def reposition(self, lat: float, lon: float, alt_amsl_m: float) -> float:
+        """Send the aircraft to a place; returns the time at which that went out.
+
+        Whether it flies there is told by TargetTaken or TargetNotTaken.
+
+        Raises:
+            NotPermitted: it is not ours to move now, or the place is not one to fly to. Nothing was sent.
+        """
+        self._pump()
+        self._core.reposition(lat, lon, alt_amsl_m, self._clock.now())
+        self._flush()
+        return self._clock.now()
+
+    def hold(self) -> float:
+        """Stop here, in the guided mode; returns the time at which that went out. Raises NotPermitted."""
+        self._pump()
+        self._core.hold(self._clock.now())
+        self._flush()
+        return self._clock.now()
+
+    async def set_speed(self, speed_mps: float) -> None:
+        """Fly at this ground speed from now on.
+
+        Raises:
+            NotPermitted: it is not ours to move now, or not a speed to fly at.
+            CommandFailed: the vehicle refused.
+        """
+        if not 0.1 <= speed_mps <= self.settings.max_speed_mps:
+            limit = self.settings.max_speed_mps
+            raise NotPermitted(f"no speed of {speed_mps} m/s: between 0.1 and {limit:g} m/s is possible")
+        self._pump()
+        since = self._clock.now()
+        outcome = await self._ask(self._need_autopilot().change_speed(speed_mps))
+        if not isinstance(outcome, Accepted):
+            why = await self._explain(outcome, since)
+            raise CommandFailed(f"the vehicle did not take a speed of {speed_mps:g} m/s: {why}")
+
+    def release_control(self, reason: str) -> None:
+        """Give control up until `enter_guided`: nothing that moves the aircraft is sent any more."""
+        self._core.release_control(reason, self._clock.now())
+        self._flush()
+
+    def status_text(self, text: str, severity: int = _SEVERITY_INFO) -> bool:
+        """Say something to the pilot; False if no vehicle was heard yet."""
+        said = self._core.status_text(text, severity)
+        self._flush()
+        return said
+
+    # ---- the shell
+
+    def _pump(self) -> None:
+        """Take in everything that the wire has, then send what that caused."""
+        chunks, now = self._transport.receive(), self._clock.now()
+        for data, source in chunks:  # one time for all: what waited in the buffer is as old as its oldest
+            self._publish(self._core.receive_data(data, now, source))
+        self._flush()
+        self._announce()
+
+    async def _tick_for_ever(self) -> None:
+        pause = max(_TICK_S, _SHORTEST_TICK_WALL_S * self._clock.speedup)
+        while True:
+            self._pump()
+            self._publish(self._core.tick(self._clock.now()))
+            self._flush()
+            self._announce()
+            await self._clock.sleep(pause)
+
+    def _flush(self) -> None:
+        for frame in self._core.data_to_send():
+            self._transport.send(frame, self._core.destination)
+
+    def _publish(self, events: list[VehicleEvent]) -> None:
+        for event in events:
+            self._queue.put_nowait(event)
+            if isinstance(event, CommandDone):
+                waiting = self._waiting.pop(event.ticket, None)
+                if waiting is not None and not waiting.done():
+                    waiting.set_result(event.outcome)
+
+    def _announce(self) -> None:
+        changed, self._changed = self._changed, asyncio.Event()
+        changed.set()
+
+    async def _until(self, condition: Callable[[], _T | None], timeout_s: float) -> _T | None:
+        """Wait until a condition gives something; None if it did not in time."""
+        try:
+            async with self._clock.timeout(timeout_s):
+                while (value := condition()) is None:
+                    await self._changed.wait()
+                return value
+        except TimeoutError:
+            return condition()
+
+    def _patience(self, seconds: float) -> float:
+        """A time to wait for an answer, never too short in wall time for a busy host."""
+        return max(seconds, _PATIENCE_WALL_S * self._clock.speedup)
+
+    def _need_autopilot(self) -> Autopilot:
+        if self._core.autopilot is None:
+            raise NotPermitted("no vehicle has been heard")
+        return self._core.autopilot
+
+    def _climbing(self) -> bool:
+        return self.telemetry.landed_state in ("takeoff", "in_air")
+
+    async def _ask(self, command: Command, *, ordered: bool = False) -> Outcome:
+        """Send a command and wait for its end, which the core sees to."""
+        ticket = self._core.request(command, self._clock.now(), ordered=ordered)
+        future: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
+        self._waiting[ticket] = future
+        self._flush()
+        try:
+            return await future
+        finally:
+            self._waiting.pop(ticket, None)
+
+    async def _go(self, command: Command, mode: str, *, ordered: bool) -> None:
+        self._pump()
+        if self.telemetry.mode == mode and self.telemetry.armed:
+            return
+        await self._reach(command, mode, ordered=ordered)
+
+    async def _reach(self, command: Command, mode: str, *, ordered: bool) -> None:
+        """Send a command and wait for the mode it leads to; the heartbeat is the judge, not the answer."""
+        since = self._clock.now()
+        before = self.telemetry.mode
+        outcome = await self._ask(command, ordered=ordered)
+        wait = 0.0 if isinstance(outcome, Cancelled) else self._patience(_MODE_S)
+        if not await self.wait_until(lambda t: t.mode == mode, wait):
+            raise CommandFailed(
+                f"the vehicle did not go from {before} to {mode}: {await self._explain(outcome, since)}"
+            )
+
+    async def _explain(self, outcome: Outcome, since: float) -> str:
+        """What became of a command that did not do what it should, for a person."""
+        await self._clock.sleep(_COMPLAINT_S)
+        match outcome:
+            case Accepted():
+                said = "it accepted, and did not do it"
+            case Refused(name=name):
+                said = f"it answered {name}"
+            case Cancelled(reason=reason):
+                said = reason
+            case _:
+                said = "it did not answer"
+        return said + self._complaint(since)
+
+    def _complaint(self, since: float) -> str:
+        """What the vehicle has said about it, if anything."""
+        texts = [t.text for t in self._core.recent_texts(since) if t.severity <= _SEVERITY_WARNING]
+        return f" (it says: {texts[-1]})" if texts else ""

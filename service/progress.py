@@ -1,0 +1,75 @@
+"""What a person sees while the service runs: a live table in a terminal, plain log lines elsewhere."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from rich.console import Console
+from rich.live import Live
+from rich.logging import RichHandler
+from rich.table import Table
+
+log = logging.getLogger("roisearch")
+LINE_EVERY_S = 5.0
+
+
+def set_up_logging(console: Console) -> None:
+    """Log lines above the live table in a terminal, plain lines on standard output elsewhere."""
+    handler: logging.Handler
+    if console.is_terminal:
+        handler = RichHandler(console=console, show_path=False, show_level=False, log_time_format="[%X]")
+    else:
+        handler = logging.StreamHandler(sys.stdout)
+        handler.setFormatter(logging.Formatter("%(asctime)s  %(message)s", "%H:%M:%S"))
+    log.handlers = [handler]
+    log.setLevel(logging.INFO)
+    log.propagate = False
+
+
+def facts(state: dict[str, Any]) -> list[tuple[str, str]]:
+    """The state in words: name and value."""
+    battery = state["battery_percent"]
+    left = state["flight_left_s"]
+    place = state["place"]
+    return [
+        ("state", state["state"]),
+        ("probability of success so far", f"{state['pos']:.1%}"),
+        ("most likely place", f"{place['probability']:.1%} at {place['lat']:.6f}, {place['lon']:.6f}"),
+        ("steps", str(state["steps"])),
+        ("in the air", f"{state['flight_time_s']:.0f} s"),
+        ("flight time left", "unknown" if left is None else f"about {left / 60:.0f} min"),
+        ("battery", "unknown" if battery is None else f"{battery:.0f} %"),
+        ("going to", state["reason"]),
+    ]
+
+
+def line(state: dict[str, Any]) -> str:
+    """The state as one log line."""
+    battery = state["battery_percent"]
+    return (
+        f"{state['state']:10} POS {state['pos']:6.1%}  {state['steps']:4d} steps  "
+        f"{state['flight_time_s']:5.0f} s  battery {'?' if battery is None else f'{battery:.0f}'} %  {state['reason']}"
+    )
+
+
+def _table(state: dict[str, Any]) -> Table:
+    table = Table.grid(padding=(0, 2))
+    for name, value in facts(state):
+        table.add_row(f"[dim]{name}[/dim]", value)
+    return table
+
+
+async def show(console: Console, state: Callable[[], dict[str, Any]]) -> None:
+    """Show the state until cancelled."""
+    if not console.is_terminal:
+        while True:
+            await asyncio.sleep(LINE_EVERY_S)
+            log.info("%s", line(state()))
+    with Live(_table(state()), console=console, refresh_per_second=8) as live:
+        while True:
+            await asyncio.sleep(0.125)
+            live.update(_table(state()))

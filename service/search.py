@@ -1,0 +1,110 @@
+"""The search as the mission sees it: one belief, one planner, and what has been looked at so far.
+
+No search mathematics here: it holds the pieces of `roisearch` together, and keeps the belief out of the planner's
+hands while it thinks in another thread.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roisearch import Belief, Decision, FieldOfView, Regions, SearchState, make_planner, segment_regions
+from roisearch.detection import DetectionRecord
+from roisearch.place import Place, most_likely_place
+from service.area import Grid
+from service.config import Settings
+from service.evidence import Observation
+
+Cell = tuple[int, int]
+FIELDS_OF_VIEW: dict[str, Callable[[], FieldOfView]] = {
+    "point": FieldOfView.point,
+    "donut": FieldOfView.donut,
+    "wide-angle": FieldOfView.wide_angle,
+}
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why the aircraft goes where it goes, for a person: one line, and the root options with their visits."""
+
+    text: str
+    options: tuple[tuple[str, int, float], ...]
+
+
+class Search:
+    """One target, one grid, one planner."""
+
+    def __init__(self, grid: Grid, settings: Settings) -> None:
+        self.grid = grid
+        self.settings = settings
+        self.belief = Belief(grid.prior, searchable=grid.searchable, outside=grid.outside)
+        self.record = DetectionRecord(grid.prior, grid.outside)
+        self.regions: Regions = segment_regions(self.belief.probability(), searchable=grid.searchable)
+        self.fov = FIELDS_OF_VIEW[settings.sensor.profile]()
+        self.planner = make_planner(
+            settings.search.planner, fov=self.fov, flyable=grid.flyable, regions=self.regions
+        )
+        # one thread: a dropped decision may still be thinking, and the planner is one object
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
+        self._rng = np.random.default_rng(settings.run.seed)
+        self._place: Place | None = None
+
+    def warm_up(self, progress: Callable[[str, int, int], None] | None = None) -> None:
+        """Compile what the planner needs; `progress(name, done, total)` is told."""
+        self.planner.warm_up(progress)
+
+    def apply(self, observation: Observation) -> None:
+        """Update the belief, exactly, and the record of looks."""
+        self.belief.observe(observation.cells, observation.hits, observation.p_tp, observation.p_tn)
+        self.record.look(observation.cells[observation.first], observation.p_tp[observation.first])
+        self._place = None
+
+    @property
+    def place(self) -> Place:
+        """The most likely place of the target now."""
+        if self._place is None:
+            self._place = most_likely_place(self.belief.probability())
+        return self._place
+
+    async def decide(self, cell: Cell, heading: str, ahead: Sequence[Cell]) -> Decision:
+        """A decision from `cell`, as if the cells `ahead` will have been looked at in vain; in a worker thread."""
+        thought = self.belief.copy()
+        for step in ahead:
+            cells = self.fov.cells(step, heading, self.grid.frame.shape)
+            sensor = self.settings.sensor
+            thought.observe(cells, np.zeros(len(cells), dtype=np.bool_), sensor.p_tp, sensor.p_tn)
+        state = SearchState(cell=cell, heading=heading)
+        deadline = self.settings.search.deadline_s
+        think = functools.partial(self.planner.plan, thought, state, self._rng, deadline_s=deadline)
+        return await asyncio.get_running_loop().run_in_executor(self._thread, think)
+
+    def reason(self, decision: Decision, cell: Cell) -> Reason:
+        """The decision in words: where to, how much is there, how far, and what else was weighed."""
+        ranked = sorted(decision.alternatives, key=lambda option: -option.visits)
+        options = tuple((option.action, option.visits, option.value) for option in ranked)
+        goal = decision.path[-1] if decision.path else cell
+        label = int(self.regions.labels[goal])
+        distance = self.distance(cell, goal)
+        if label:
+            mass = float(self.belief.probability()[self.regions.labels == label].sum())
+            where = f"ROI {label}: {mass:.0%} of the probability, {distance:.0f} m"
+        else:
+            where = f"open ground, {distance:.0f} m"
+        return Reason(f"{decision.action} → {where}", options)
+
+    def distance(self, here: Cell, there: Cell) -> float:
+        """Metres between two cells along the grid."""
+        return (abs(here[0] - there[0]) + abs(here[1] - there[1])) * self.grid.frame.cell_m
+
+    def nearest_flyable(self, cell: Cell) -> Cell:
+        """The flyable cell nearest to `cell`, itself if it is flyable."""
+        cells: NDArray[np.int64] = np.argwhere(self.grid.flyable)
+        row, col = cells[np.abs(cells - np.array(cell)).sum(axis=1).argmin()]
+        return int(row), int(col)

@@ -1,0 +1,96 @@
+"""The mission's state machine: every state, every event, and what each pair leads to.
+
+A search waits for the aircraft (WAITING), is READY when it may fly, climbs (TAKEOFF), and then alternates
+between SEARCHING and CONFIRMING (a place looks promising: look again). It ends by being FOUND or by having
+searched enough, flies home (RETURNING), and is DONE on the ground. HOLDING is a hover with a reason that can
+pass: the operator asked, the detector is silent, the link is gone. YIELDED means that the pilot has the
+aircraft: nothing that moves it is sent until an operator resumes. ABORTED ends the run where it stands.
+
+The table is the machine: `next_state` looks a pair up and does nothing else. A pair that is not in the table
+changes nothing, which is what an event that comes too late should do.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class State(StrEnum):
+    WAITING = "WAITING"
+    READY = "READY"
+    TAKEOFF = "TAKEOFF"
+    SEARCHING = "SEARCHING"
+    CONFIRMING = "CONFIRMING"
+    FOUND = "FOUND"
+    HOLDING = "HOLDING"
+    YIELDED = "YIELDED"
+    RETURNING = "RETURNING"
+    DONE = "DONE"
+    ABORTED = "ABORTED"
+
+
+class Event(StrEnum):
+    LINKED = "linked"  # paired, position known, ready to fly
+    CLIMB = "climb"  # a take-off was ordered
+    AIRBORNE = "airborne"  # at search height in the guided mode
+    SUSPECT = "suspect"  # one place stands out
+    CLEARED = "cleared"  # it no longer does
+    CONFIRMED = "confirmed"  # the posterior passed the threshold
+    SEARCHED = "searched"  # enough of the probability has been looked at
+    ENERGY_LOW = "energy low"
+    PILOT = "pilot"  # a mode change that was not asked for
+    HOLD = "hold"
+    RESUME = "resume"
+    RETURN = "return"
+    LANDED = "landed"
+    ABORT = "abort"
+
+
+FLYING = (State.SEARCHING, State.CONFIRMING)
+MAY_MOVE = frozenset({State.TAKEOFF, State.SEARCHING, State.CONFIRMING, State.RETURNING})
+FINAL = frozenset({State.DONE, State.ABORTED})
+
+TABLE: dict[tuple[State, Event], State] = {
+    (State.WAITING, Event.LINKED): State.READY,
+    (State.READY, Event.CLIMB): State.TAKEOFF,
+    (State.READY, Event.AIRBORNE): State.SEARCHING,
+    (State.TAKEOFF, Event.AIRBORNE): State.SEARCHING,
+    (State.TAKEOFF, Event.PILOT): State.YIELDED,
+    (State.TAKEOFF, Event.RETURN): State.RETURNING,
+    (State.SEARCHING, Event.SUSPECT): State.CONFIRMING,
+    (State.CONFIRMING, Event.CLEARED): State.SEARCHING,
+    (State.HOLDING, Event.RESUME): State.SEARCHING,
+    (State.HOLDING, Event.PILOT): State.YIELDED,
+    (State.HOLDING, Event.RETURN): State.RETURNING,
+    (State.HOLDING, Event.ENERGY_LOW): State.RETURNING,
+    (State.HOLDING, Event.CONFIRMED): State.FOUND,
+    (State.HOLDING, Event.LANDED): State.DONE,
+    (State.YIELDED, Event.RESUME): State.SEARCHING,
+    (State.YIELDED, Event.RETURN): State.RETURNING,
+    (State.YIELDED, Event.LANDED): State.DONE,
+    (State.FOUND, Event.RETURN): State.RETURNING,
+    (State.FOUND, Event.PILOT): State.YIELDED,
+    (State.FOUND, Event.LANDED): State.DONE,
+    (State.RETURNING, Event.PILOT): State.YIELDED,
+    (State.RETURNING, Event.HOLD): State.HOLDING,
+    (State.RETURNING, Event.LANDED): State.DONE,
+    **{
+        (state, event): to
+        for state in FLYING
+        for event, to in {
+            Event.CONFIRMED: State.FOUND,
+            Event.SEARCHED: State.RETURNING,
+            Event.ENERGY_LOW: State.RETURNING,
+            Event.PILOT: State.YIELDED,
+            Event.HOLD: State.HOLDING,
+            Event.RETURN: State.RETURNING,
+            Event.LANDED: State.DONE,
+        }.items()
+    },
+    **{(state, Event.ABORT): State.ABORTED for state in State if state not in FINAL},
+}
+
+
+def next_state(state: State, event: Event) -> State:
+    """The state that `event` leads to from `state`; the same state where the table has no entry."""
+    return TABLE.get((state, event), state)

@@ -1,0 +1,40 @@
+"""The state machine's table: what must always and what must never happen."""
+
+from __future__ import annotations
+
+import pytest
+
+from service.states import FINAL, MAY_MOVE, TABLE, Event, State, next_state
+
+
+def test_an_event_that_is_not_in_the_table_changes_nothing() -> None:
+    for state in State:
+        for event in Event:
+            if (state, event) not in TABLE:
+                assert next_state(state, event) == state
+
+
+@pytest.mark.parametrize("state", sorted(MAY_MOVE))
+def test_a_pilot_takes_the_aircraft_out_of_every_state_that_moves_it(state: State) -> None:
+    assert next_state(state, Event.PILOT) == State.YIELDED
+
+
+def test_only_an_operator_gets_out_of_yielded() -> None:
+    ways_out = {event for (state, event) in TABLE if state == State.YIELDED}
+    assert ways_out == {Event.RESUME, Event.RETURN, Event.LANDED, Event.ABORT}
+    assert State.YIELDED not in MAY_MOVE
+
+
+def test_every_state_can_be_reached_and_every_unfinished_one_left() -> None:
+    reached = {State.WAITING}
+    while new := {to for (state, _), to in TABLE.items() if state in reached} - reached:
+        reached |= new
+    assert reached == set(State)
+    for state in set(State) - FINAL:
+        assert any(to in FINAL or to != state for (at, _), to in TABLE.items() if at == state)
+    assert not [pair for pair in TABLE if pair[0] in FINAL]
+
+
+def test_abort_ends_every_unfinished_state() -> None:
+    for state in set(State) - FINAL:
+        assert next_state(state, Event.ABORT) == State.ABORTED

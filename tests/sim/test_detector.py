@@ -1,0 +1,70 @@
+"""The simulated detector: one verdict per cell and pass, with the rates it was told."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from sim.detector import Detector, contains, main
+
+SQUARE = [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
+
+
+def state(row: int, counts: bool = True) -> dict[str, Any]:
+    corners = [[lat - row, lon] for lat, lon in SQUARE]
+    cell = {"row": row, "col": 0, "lat": 0.5 - row, "lon": 0.5, "corners": corners}
+    return {"pose": {"time": float(row)}, "footprint": {"counts": counts, "covered": 1.0, "cells": [cell]}}
+
+
+def rate(target: tuple[float, float] | None, p_tp: float, p_tn: float) -> float:
+    """Share of 2000 passes over cell 0 with a detection."""
+    detector = Detector(target, p_tp, p_tn, seed=3)
+    reported = 0
+    for _ in range(2000):
+        reported += bool(detector.frame(state(0))["detections"])
+        detector.frame(state(1))
+    return reported / 2000
+
+
+def test_it_reports_the_target_as_often_as_it_was_told() -> None:
+    assert rate((0.4, 0.4), 0.7, 0.95) == pytest.approx(0.7, abs=0.04)
+
+
+def test_it_raises_false_alarms_as_often_as_it_was_told() -> None:
+    assert rate((-40.0, 0.4), 0.7, 0.95) == pytest.approx(0.05, abs=0.02)
+    assert rate(None, 0.7, 0.8) == pytest.approx(0.2, abs=0.04)
+
+
+def test_frames_of_one_pass_repeat_its_verdict() -> None:
+    detector = Detector((0.4, 0.4), 0.5, 0.5, seed=1)
+    for _ in range(50):
+        verdicts = {bool(detector.frame(state(0))["detections"]) for _ in range(10)}
+        assert len(verdicts) == 1
+        detector.frame(state(1))
+
+
+def test_a_frame_between_cells_reports_that_nothing_was_seen() -> None:
+    detector = Detector((0.4, 0.4), 1.0, 0.5, seed=1)
+    assert detector.frame(state(0, counts=False))["detections"] == []
+
+
+def test_ids_are_never_repeated() -> None:
+    detector = Detector(None, 0.9, 0.9, seed=1)
+    assert len({detector.frame(state(0))["id"] for _ in range(20)}) == 20
+
+
+def test_a_detection_is_where_the_target_is_and_a_false_alarm_in_its_cell() -> None:
+    detector = Detector((0.4, 0.3), 1.0, 0.5, seed=1)
+    report = detector.frame(state(0))
+    assert (report["detections"][0]["lat"], report["detections"][0]["lon"]) == (0.4, 0.3)
+    assert contains(SQUARE, (0.4, 0.3))
+    assert not contains(SQUARE, (1.4, 0.3))
+    assert contains(SQUARE[::-1], (0.4, 0.3))
+
+
+@pytest.mark.parametrize("text", ["here", "95,8", "47.1"])
+def test_a_wrong_target_is_refused_in_words(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--service", "http://127.0.0.1:1", "--target", text])
+    assert text in capsys.readouterr().err

@@ -124,7 +124,8 @@ def _reboot(a: Autopilot, options: Options) -> None:
 
 # ---- who is in charge
 def _pilot(a: Autopilot, options: Options) -> None:
-    a.firmware.pilot(options["mode"] or a.firmware.pilot_mode)
+    if options["mode"] != "keep":  # "keep": only moves the sticks
+        a.firmware.pilot(options["mode"] or a.firmware.pilot_mode)
 
 
 def _pilot_sticks(a: Autopilot, options: Options) -> None:

@@ -36,6 +36,7 @@ _MODES |= {name: (81, _custom(main)) for name, main in _MAIN.items() if name not
 _MODES["OFFBOARD"] = (17, _custom(6))
 _MODE_OF = {custom: name for name, (_, custom) in _MODES.items()}
 _STICK_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED")
+_STICK_OVERRIDE = 0.3  # COM_RC_STICK_OV: deflection that takes the vehicle out of an automatic mode
 _NO_FAILSAFE = ("AUTO_RTL", "AUTO_LAND", "AUTO_TAKEOFF", "AUTO_PRECLAND")
 
 
@@ -317,6 +318,11 @@ class Px4(Firmware):
         held = time - self.vehicle.sticks.heard_at < timeout
         lost = self._sticks_held and not held
         self._sticks_held = held
+        sticks = self.vehicle.sticks
+        pushed = held and max(abs(sticks.pitch), abs(sticks.roll)) > _STICK_OVERRIDE
+        if pushed and self.vehicle.flying and self.mode.startswith("AUTO_"):
+            self.vehicle.say(INFO, "Pilot took over using sticks")
+            self.pilot("POSCTL")
         if lost and self.vehicle.flying and self.mode not in _NO_FAILSAFE and self.mode != "OFFBOARD":
             self.fail_to("AUTO_LOITER", "Failsafe activated: entering Hold for 5 seconds")
             self._hold_until = time + 5.0

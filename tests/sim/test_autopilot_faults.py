@@ -212,8 +212,8 @@ def test_pilot_who_flies_out_of_the_fence_is_brought_home(flight: Flight) -> Non
         "GF_ACTION" if flight.px4 else "FENCE_ACTION", 3 if flight.px4 else 1
     )
     flight.long(mav.MAV_CMD_DO_FENCE_ENABLE, 1)
-    flight.fault("pilot", pitch=1.0)
-    assert flight.wait(lambda: flight.mode == RETURN[flight.flavor], 30.0)
+    flight.fault("pilot", pitch=0.25)  # gently: PX4 takes a hard push for a pilot who wants it back
+    assert flight.wait(lambda: flight.mode == RETURN[flight.flavor], 60.0)
     flight.listen(0.5)
     assert any("fence" in text.lower() for text in flight.texts)
 
@@ -228,6 +228,12 @@ def test_pilot_takes_the_mode_and_the_sticks(flight: Flight) -> None:
     flight.listen(3.0)
     assert leg.acks in (["UNSUPPORTED"], ["DENIED"])
     assert flight.mode == PILOT[flight.flavor]
+
+
+def test_pushed_sticks_take_px4_out_of_its_automatic_mode_and_not_arducopter(flight: Flight) -> None:
+    flight.fault("pilot", mode="keep", pitch=1.0, seconds=15.0)
+    flight.listen(3.0)
+    assert flight.mode == ("POSCTL" if flight.px4 else "GUIDED")
 
 
 def test_failsafe_comes_home_and_says_so(flight: Flight) -> None:

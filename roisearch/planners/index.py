@@ -111,4 +111,4 @@ class IndexPlanner:
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use, by making some on a small map."""
-        warm_up(IndexPlanner(fov=self._fov), self._fov, progress)
+        warm_up(lambda ground: IndexPlanner(fov=self._fov, flyable=ground), self._fov, progress)

@@ -200,7 +200,11 @@ class PuctPlanner:
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use."""
-        warm_up(PuctPlanner(self.name, self.settings, fov=self._fov), self._fov, progress)
+        warm_up(
+            lambda ground: PuctPlanner(self.name, self.settings, fov=self._fov, flyable=ground),
+            self._fov,
+            progress,
+        )
 
 
 class _Trip:

@@ -7,6 +7,7 @@ import contextlib
 import json
 import logging
 import math
+import os
 import re
 import shutil
 import signal
@@ -25,7 +26,7 @@ from service.config import Settings
 from service.demo import World
 from service.errors import BadInput
 from service.evidence import Observation, Pose, Sensor
-from service.http import Server, bind, create_app, read_token, split_address
+from service.http import Door, open_door
 from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, LinkSettings, Vehicle
@@ -58,9 +59,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     grid = build_grid(area, cell_size(settings))
     if prior_file is not None:
         grid = grid.with_prior(read_geotiff_prior(prior_file, grid.frame, grid.searchable))
-    host, port = split_address(settings.http.listen)
-    token = read_token(host, settings.http.token_file)
-    listener = bind(host, port)
+    door = open_door(settings.http, os.environ)
     try:
         folder = _new_folder(Path(settings.run.folder), area.name)
         shutil.copyfile(area_file, folder / "area.geojson")
@@ -73,10 +72,9 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
         service = Service(area, search, settings, folder, console)
-        url = "http://{}:{}".format(*listener.getsockname()[:2])
-        return asyncio.run(service.fly(listener, url, token))
+        return asyncio.run(service.fly(door))
     finally:
-        listener.close()
+        door.close()
 
 
 def _new_folder(parent: Path, name: str) -> Path:
@@ -139,12 +137,13 @@ class Service:
 
     # ---- the flight --------------------------------------------------------------------------------------
 
-    async def fly(self, listener: Any, url: str, token: str) -> int:
+    async def fly(self, door: Door) -> int:
         """Start everything, fly, and write the results."""
         self.journal = Journal(self.folder / "journal.sqlite")
         self.journal.set_meta("grid", self.search.grid.frame.to_dict())
         self.journal.set_meta("settings", self.settings.model_dump())
-        server = Server(create_app(self, token), listener)
+        door, guest_token = door.with_guest()
+        server = door.server(self)
         serving = asyncio.create_task(server.run_until_told())
         began = time.time()
         try:
@@ -162,9 +161,9 @@ class Service:
                     intake=self.intake,
                     may_take_off=self.settings.mock or self.settings.flight.takeoff,
                 )
-                log.info("listening on %s", url)
+                log.info("listening on %s", door.url)
                 if self.world is not None:
-                    await self.world.start_detector(url)
+                    await self.world.start_detector(door.url, guest_token)
                 await self._run_mission(self.mission)
         finally:
             report = self._report(began) if self.mission is not None else None

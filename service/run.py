@@ -29,7 +29,7 @@ from service.evidence import Observation, Pose, Sensor
 from service.http import Door, open_door
 from service.intake import Intake, JournalLost
 from service.journal import Journal
-from service.mavlink import LinkError, LinkSettings, Vehicle
+from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
 from service.mission import Mission
 from service.picture import Scene, draw_scene
 from service.progress import set_up_logging, show
@@ -59,6 +59,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     grid = build_grid(area, cell_size(settings))
     if prior_file is not None:
         grid = grid.with_prior(read_geotiff_prior(prior_file, grid.frame, grid.searchable))
+    signing_key = _signing_key(settings)
     door = open_door(settings.http, os.environ)
     try:
         folder = _new_folder(Path(settings.run.folder), area.name)
@@ -72,9 +73,20 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
         service = Service(area, search, settings, folder, console)
-        return asyncio.run(service.fly(door))
+        return asyncio.run(service.fly(door, signing_key))
     finally:
         door.close()
+
+
+def _signing_key(settings: Settings) -> bytes | None:
+    """The key for MAVLink signing, if there is one; raises BadInput."""
+    if not settings.link.signing_key_file:
+        return None
+    if settings.mock:
+        raise BadInput(
+            "the built-in mock autopilot does not sign; give --connect, or leave link.signing_key_file out"
+        )
+    return read_signing_key(settings.link.signing_key_file)
 
 
 def _new_folder(parent: Path, name: str) -> Path:
@@ -137,7 +149,7 @@ class Service:
 
     # ---- the flight --------------------------------------------------------------------------------------
 
-    async def fly(self, door: Door) -> int:
+    async def fly(self, door: Door, signing_key: bytes | None = None) -> int:
         """Start everything, fly, and write the results."""
         self.journal = Journal(self.folder / "journal.sqlite")
         self.journal.set_meta("grid", self.search.grid.frame.to_dict())
@@ -148,7 +160,9 @@ class Service:
         began = time.time()
         try:
             connect = await self._start_world()
-            async with Vehicle.open(connect, clock=self.clock, settings=self._link_settings()) as vehicle:
+            async with Vehicle.open(
+                connect, clock=self.clock, settings=self._link_settings(signing_key)
+            ) as vehicle:
                 self.intake = Intake(
                     self.search, self.sensor, self.journal, self.clock, self._pose_at(vehicle), self._observed
                 )
@@ -177,12 +191,14 @@ class Service:
         self._write_results(report)
         return EXIT_CODES[report["outcome"]]
 
-    def _link_settings(self) -> LinkSettings:
+    def _link_settings(self, signing_key: bytes | None) -> LinkSettings:
         link = self.settings.link
         return LinkSettings(
             system_id=link.system_id or None,
             allow_arming=self.settings.mock or self.settings.flight.takeoff,
             link_lost_s=link.silent_after_s,
+            signing_key=signing_key,
+            signing_timestamp_file=Path(self.settings.run.folder) / "signing-timestamp",
         )
 
     async def _start_world(self) -> str:

@@ -15,7 +15,7 @@ from roisearch.fov import HEADINGS, FieldOfView, heading_index
 from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
-from roisearch.planners.base import Progress, Scene, World, cells_of
+from roisearch.planners.base import Progress, Scene, World
 from roisearch.regions import Regions, segment_regions
 
 ROLLOUT_BALANCES = ((0.4, 1.0), (0.33, 1.0), (0.45, 1.0), (0.4, 2.0), (0.4, 0.3), (0.5, 2.0))
@@ -372,7 +372,8 @@ class SweepPlanner:
             move = (legal & -legal).bit_length() - 1
             there = (cell[0] + (move == 2) - (move == 0), cell[1] + (move == 1) - (move == 3))
             return Decision((there,), HEADINGS[move], 0.0, Effort(iterations, time.perf_counter() - began))
-        path = cells_of(tree.path[now : min(length, now + self.settings.path)], cols)
+        ahead = tree.path[now : min(length, now + self.settings.path)].tolist()
+        path = tuple(divmod(flat, cols) for flat in ahead)
         region = int(tree.action[now])
         move = next(
             i for i in range(4)

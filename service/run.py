@@ -6,12 +6,11 @@ import asyncio
 import contextlib
 import logging
 import math
+import os
 import re
 import shutil
 import signal
-import socket
 import time
-from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -24,10 +23,10 @@ from service.config import Settings
 from service.demo import World
 from service.errors import BadInput
 from service.evidence import Observation, Pose, Sensor
-from service.http import Server, bind, create_app, read_token, split_address
+from service.http import Door, open_door
 from service.intake import Intake, JournalLost
 from service.journal import Journal
-from service.mavlink import LinkError, LinkSettings, Vehicle
+from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
 from service.mission import Mission
 from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
@@ -55,7 +54,8 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     console = Console()
     set_up_logging(console)
     area, grid = _survey(area_file, prior_file, settings)
-    with _door(settings) as (listener, token):
+    signing_key = _signing_key(settings)
+    with contextlib.closing(open_door(settings.http, os.environ)) as door:
         folder = _new_folder(Path(settings.run.folder), area.name)
         shutil.copyfile(area_file, folder / AREA)
         if prior_file is not None:
@@ -63,7 +63,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
         journal = Journal(folder / JOURNAL)
         journal.set_meta("grid", grid.frame.to_dict())
         journal.set_meta("settings", settings.model_dump())
-        return _search(area, grid, settings, folder, journal, listener, token, console)
+        return _search(area, grid, settings, folder, journal, door, signing_key, console)
 
 
 def resume(folder: Path, changed: dict[str, Any]) -> int:
@@ -73,13 +73,14 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
     settings = stored_settings(folder / JOURNAL, changed)
     prior_file = folder / PRIOR
     area, grid = _survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
-    with _door(settings) as (listener, token):
+    signing_key = _signing_key(settings)
+    with contextlib.closing(open_door(settings.http, os.environ)) as door:
         journal = Journal(folder / JOURNAL)
         if journal.meta("grid") != grid.frame.to_dict():
             raise BadInput(
                 f"{folder}: its journal is of another grid than its area file makes; resume it unchanged"
             )
-        return _search(area, grid, settings, folder, journal, listener, token, console)
+        return _search(area, grid, settings, folder, journal, door, signing_key, console)
 
 
 def _survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tuple[SearchArea, Grid]:
@@ -96,13 +97,15 @@ def _survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tup
     return area, grid
 
 
-@contextlib.contextmanager
-def _door(settings: Settings) -> Iterator[tuple[socket.socket, str]]:
-    """The listening socket and the token that it asks for."""
-    host, port = split_address(settings.http.listen)
-    token = read_token(host, settings.http.token_file)
-    with bind(host, port) as listener:
-        yield listener, token
+def _signing_key(settings: Settings) -> bytes | None:
+    """The key for MAVLink signing, if there is one; raises BadInput."""
+    if not settings.link.signing_key_file:
+        return None
+    if settings.mock:
+        raise BadInput(
+            "the built-in mock autopilot does not sign; give --connect, or leave link.signing_key_file out"
+        )
+    return read_signing_key(settings.link.signing_key_file)
 
 
 def _search(
@@ -111,8 +114,8 @@ def _search(
     settings: Settings,
     folder: Path,
     journal: Journal,
-    listener: socket.socket,
-    token: str,
+    door: Door,
+    signing_key: bytes | None,
     console: Console,
 ) -> int:
     """Compile the planner and fly."""
@@ -120,9 +123,8 @@ def _search(
         search = Search(grid, settings)
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
-        host, port = listener.getsockname()[:2]
         service = Service(area, search, settings, folder, console)
-        return asyncio.run(service.fly(listener, f"http://{host}:{port}", token, journal))
+        return asyncio.run(service.fly(door, journal, signing_key))
     finally:
         journal.close()
 
@@ -174,18 +176,20 @@ class Service:
         )
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 
-    async def fly(self, listener: socket.socket, url: str, token: str, journal: Journal) -> int:
+    async def fly(self, door: Door, journal: Journal, signing_key: bytes | None) -> int:
         """Start everything, fly, and write the results; returns the exit code."""
         began = time.time()
-        server = Server(create_app(self.view, token), listener)
+        door, guest_token = door.with_guest()
+        server = door.server(self.view)
         serving = asyncio.create_task(server.run_until_told())
         try:
             connect = await self._start_world()
-            async with Vehicle.open(connect, clock=self.clock, settings=self._link_settings()) as vehicle:
+            link = self._link_settings(signing_key)
+            async with Vehicle.open(connect, clock=self.clock, settings=link) as vehicle:
                 mission = self._assemble(vehicle, journal)
-                log.info("listening on %s", url)
+                log.info("listening on %s", door.url)
                 if self.world is not None:
-                    await self.world.start_detector(url)
+                    await self.world.start_detector(door.url, guest_token)
                 await self._run_mission(mission)
         except LinkError as error:
             log.error("%s", error)
@@ -234,12 +238,14 @@ class Service:
         self.view.mission, self.view.intake = mission, intake
         return mission
 
-    def _link_settings(self) -> LinkSettings:
+    def _link_settings(self, signing_key: bytes | None) -> LinkSettings:
         link = self.settings.link
         return LinkSettings(
             system_id=link.system_id or None,
             allow_arming=self.settings.mock or self.settings.flight.takeoff,
             link_lost_s=link.silent_after_s,
+            signing_key=signing_key,
+            signing_timestamp_file=Path(self.settings.run.folder) / "signing-timestamp",
         )
 
     async def _start_world(self) -> str:

@@ -15,10 +15,14 @@ from roisearch.fov import HEADINGS, FieldOfView, heading_index
 from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
-from roisearch.planners.base import Progress, Scene, World, cells_of
+from roisearch.planners.base import Progress, Scene, World
 from roisearch.regions import Regions, segment_regions
 
 ROLLOUT_BALANCES = ((0.4, 1.0), (0.33, 1.0), (0.45, 1.0), (0.4, 2.0), (0.4, 0.3), (0.5, 2.0))
+PAUSE = 4
+"""Steps by the rollout's rule after a hit, before the old plan's sweeps go on."""
+UNSEEN = 0.02
+"""A new plan is made when so much of the undetected mass was flown over and not reported."""
 OPTION_BALANCES = ((0.25, 1.0), (0.6, 0.0), (1.0, 0.0), (0.4, 4.0))
 
 
@@ -144,6 +148,8 @@ class SweepPlanner:
         self._belief: Belief | None = None
         self._random = np.zeros(1, dtype=np.uint64)
         self._seconds = 0.0  # of one iteration, lately
+        self._hits = 0
+        self._unseen = 0.0  # mass flown over and not reported
 
     def _enter(self, belief: Belief, scene: Scene) -> None:
         """Make room for everything that depends on the map."""
@@ -288,22 +294,22 @@ class SweepPlanner:
             seen = self._seen(self._pose, steps)
             touched = [*touched, *seen]
             self._pose = flown
-        surprised = steps < 0 or self._pose != pose
+        lost = steps < 0 or self._pose != pose
         self._pose = pose
         changed = False
         if touched:
-            cells = np.unique(np.concatenate(touched), axis=0)
-            changed, shock = self._correct(belief, cells)
-            surprised = surprised or shock
-        if surprised:
-            self._replan(pose, 4 if steps >= 0 else 0)
+            changed = self._correct(belief, np.unique(np.concatenate(touched), axis=0))
+        if lost or belief.hits != self._hits or self._unseen > UNSEEN * tree.value[plans.UNDETECTED]:
+            self._replan(pose, 0 if lost else PAUSE)
         elif changed:
             tree.value[plans.EXPECTED] = plans.evaluate(*pose, chart, tree, self._rules)
+        self._hits = belief.hits
         if tree.mark[plans.NOW] > self.settings.horizon:
             self._shift()
 
     def _replan(self, pose: tuple[int, int, int], pause: int) -> None:
         """Plan anew from here; see `plans.replan`."""
+        self._unseen = 0.0
         plans.replan(
             *pose, self._chart, self._tree, self._rules, self._labels, self._home, self.settings.horizon,
             pause, self._wave,
@@ -312,6 +318,7 @@ class SweepPlanner:
     def _load(self, belief: Belief) -> None:
         """Take over the whole belief."""
         self._belief = belief
+        self._hits = belief.hits
         self._chart.mass[:] = np.where(self._viewable, belief.weights, 0.0)
         charts.draw_up(self._chart)
         self._tree.value[plans.UNDETECTED] = self._chart.mass.sum()
@@ -339,8 +346,8 @@ class SweepPlanner:
             seen.append(self._fov.cells((row, col), HEADINGS[heading], (self._chart.rows, self._chart.cols)))
         return seen
 
-    def _correct(self, belief: Belief, cells: NDArray[np.int64]) -> tuple[bool, bool]:
-        """Set the mass of cells to the belief's; whether any differed, and whether any is a surprise."""
+    def _correct(self, belief: Belief, cells: NDArray[np.int64]) -> bool:
+        """Set the mass of cells to the belief's; whether any differed."""
         flat = cells[:, 0] * self._chart.cols + cells[:, 1]
         actual = np.where(self._viewable[flat], belief.weights[flat], 0.0)
         expected = self._chart.mass[flat]
@@ -348,8 +355,11 @@ class SweepPlanner:
         for i in wrong.tolist():
             charts.change(self._chart, int(cells[i, 0]), int(cells[i, 1]), float(actual[i]), False)
         self._tree.value[plans.UNDETECTED] += float((actual - expected)[wrong].sum())
-        shock = bool((actual[wrong] > 2.0 * expected[wrong]).any())
-        return bool(wrong.size), shock
+        looks = (actual > 2.0 * expected) | (
+            actual < 0.5 * expected
+        )  # flown over and not reported, or reported late
+        self._unseen += float((actual - expected)[looks].sum())
+        return bool(wrong.size)
 
     def _shift(self) -> None:
         """Forget the flown part of the plan."""
@@ -372,7 +382,8 @@ class SweepPlanner:
             move = (legal & -legal).bit_length() - 1
             there = (cell[0] + (move == 2) - (move == 0), cell[1] + (move == 1) - (move == 3))
             return Decision((there,), HEADINGS[move], 0.0, Effort(iterations, time.perf_counter() - began))
-        path = cells_of(tree.path[now : min(length, now + self.settings.path)], cols)
+        ahead = tree.path[now : min(length, now + self.settings.path)].tolist()
+        path = tuple(divmod(flat, cols) for flat in ahead)
         region = int(tree.action[now])
         move = next(
             i for i in range(4)

@@ -110,14 +110,15 @@ def _step_axis(axes: Axes, cap: int) -> None:
     axes.set_xlabel("steps until the target is found (logarithmic)")
 
 
-def _rule(summary: dict[str, Any]) -> str:
+def _rule(rows: list[dict[str, Any]], summary: dict[str, Any]) -> str:
     c = summary["campaign"]
+    trials = min(row["sampled"]["trials"] for row in rows)
     ends = {"covered": "found when in view", "hit": "found at the first true hit"}[c["found"]]
-    return f"{c['trials']} trials each, {c['shape'][0]} x {c['shape'][1]} cells, at most {c['cap']} steps, {ends}"
+    return f"{trials} trials each, {c['shape'][0]} x {c['shape'][1]} cells, at most {c['cap']} steps, {ends}"
 
 
 def _title(axes: Axes, title: str, below: str) -> None:
-    axes.set_title(title, loc="left", fontsize=12.5, fontweight="bold", pad=-40)
+    axes.set_title(title, loc="left", fontsize=12.5, fontweight="bold", pad=20)
     axes.text(0.0, 1.0, below, transform=axes.transAxes, va="bottom", fontsize=8.5, color=_SOFT)
 
 
@@ -158,7 +159,7 @@ def _steps_by_planner(rows: list[dict[str, Any]], summary: dict[str, Any]) -> Fi
             )
         )
     _legend(axes, handles)
-    _title(axes, f"Steps by planner, {rows[0]['fov']} FOV", _rule(summary))
+    _title(axes, f"Steps by planner, {rows[0]['fov']} FOV", _rule(rows, summary))
     if marks:
         _note(
             axes,
@@ -188,7 +189,7 @@ def _published_marks(steps: dict[str, dict[str, float]], cap: int) -> list[tuple
     if "puct-regions-lite" in steps and "puct-regions" in steps:
         marks.append(("puct-regions-lite", (1 + published.LITE_MORE_STEPS) * steps["puct-regions"]["p50"]))
     if "greedy" in steps and "puct" in steps:
-        marks.append(("greedy", steps["puct"]["p50"] + published.GREEDY_ABOVE_PUCT))
+        marks.append(("greedy", min(steps["puct"]["p50"] + published.GREEDY_ABOVE_PUCT, float(cap))))
     if "direct-policy-search" in steps:
         marks.append(("direct-policy-search", float(cap)))
     return marks
@@ -225,7 +226,7 @@ def _steps_by_fov(rows: list[dict[str, Any]], summary: dict[str, Any]) -> Figure
     axes.set_ylim(-0.6, len(mine) - 0.25)
     _step_axis(axes, summary["campaign"]["cap"])
     _legend(axes, handles)
-    _title(axes, f"Steps by field of view, {shown(chosen)}", _rule(summary))
+    _title(axes, f"Steps by field of view, {shown(chosen)}", _rule(mine, summary))
     return figure
 
 

@@ -10,9 +10,9 @@ import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from service.errors import BadInput
 
@@ -31,6 +31,14 @@ PlannerName = Literal[
 MOCK_SPEEDUP = 20.0
 
 
+def _names(value: object) -> object:
+    """An environment variable holds several names with commas between."""
+    return [name.strip() for name in value.split(",") if name.strip()] if isinstance(value, str) else value
+
+
+Names = Annotated[list[str], BeforeValidator(_names)]
+
+
 class Section(BaseModel):
     """A table of the file: unknown keys are refused, values never change."""
 
@@ -39,6 +47,7 @@ class Section(BaseModel):
 
 class LinkSettings(Section):
     connect: str = ""
+    signing_key_file: str = ""
     system_id: int = Field(default=0, ge=0, le=255)
     silent_after_s: float = Field(default=3.0, gt=0.5, le=60)
     connect_timeout_s: float = Field(default=120.0, gt=0)
@@ -80,6 +89,14 @@ class SearchSettings(Section):
 class HttpSettings(Section):
     listen: str = "127.0.0.1:8080"
     token_file: str = ""
+    report_token_file: str = ""
+    allowed_hosts: Names = []
+    allowed_origins: Names = []
+    reports_per_s: float = Field(default=2000.0, ge=1, allow_inf_nan=False)
+    commands_per_s: float = Field(default=10.0, ge=1, allow_inf_nan=False)
+    max_batch: int = Field(default=500, ge=1, le=100_000)
+    max_body_bytes: int = Field(default=1 << 20, ge=1024, le=1 << 28)
+    body_timeout_s: float = Field(default=5.0, gt=0, le=300)
 
 
 class RunSettings(Section):
@@ -169,7 +186,15 @@ def read_settings(
             values.setdefault(section, {})[key] = variables[name]
             where = f"environment variable {name}"
             _check(values, where)
-    for dotted, value in (flags or {}).items():
+    return changed_settings(values, flags or {}, where)
+
+
+def changed_settings(values: dict[str, Any], changed: Mapping[str, Any], where: str) -> Settings:
+    """Settings from `values` (tables by section, named `where`) with some 'section.key' changed; None: not.
+
+    Raises BadInput in one sentence.
+    """
+    for dotted, value in changed.items():
         if value is not None:
             section, key = dotted.split(".")
             values.setdefault(section, {})[key] = value

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -48,21 +49,26 @@ class World:
         await world.stop()
         raise BadInput("the built-in mock autopilot did not start; run 'roisearch-sim autopilot --help'")
 
-    async def start_detector(self, service_url: str) -> None:
-        """Start the detector; it ends by itself when the run is over."""
+    async def start_detector(self, service_url: str, token: str = "") -> None:
+        """Start the detector, with a token if the door wants one; it ends by itself when the run is over."""
         sensor = self.settings.sensor
         place = [f"--target={self.target[0]:.7f},{self.target[1]:.7f}"] if self.target else []
         chances = ["--p-tp", f"{sensor.p_tp}", "--p-tn", f"{sensor.p_tn}"]
         seed = ["--seed", str(self.settings.run.seed)]
-        await self.spawn(["detector", "--service", service_url, *place, *chances, *seed])
+        await self.spawn(["detector", "--service", service_url, *place, *chances, *seed], token)
 
-    async def spawn(self, words: Sequence[str]) -> asyncio.subprocess.Process:
-        """Start one `roisearch-sim` command; it ends when our end of its standard input closes."""
+    async def spawn(self, words: Sequence[str], token: str = "") -> asyncio.subprocess.Process:
+        """Start one `roisearch-sim` command; it ends when our end of its standard input closes.
+
+        It gets no token of ours but the one given, and that in its environment: arguments are for all to see.
+        """
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("ROISEARCH_")}
         process = await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",
             "sim",
             *words,
+            env={**environment, "ROISEARCH_TOKEN": token},
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE if words[0] == "autopilot" else None,
             start_new_session=True,  # Ctrl-C is for the service, which flies home first

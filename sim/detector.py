@@ -9,10 +9,12 @@ verdict, since neighbouring frames of a real camera agree with each other.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 import uuid
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -106,6 +108,13 @@ def _probability(text: str) -> float:
     return value
 
 
+def _token(file: str | None) -> str:
+    """The bearer token: never an argument, which every user of the machine could read."""
+    if file is None:
+        return os.environ.get("ROISEARCH_TOKEN", "").strip()
+    return Path(file).read_text(encoding="ascii").strip()
+
+
 def main(arguments: list[str]) -> int:
     """The command line."""
     parser = argparse.ArgumentParser(
@@ -124,12 +133,19 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--rate", type=float, default=4.0, metavar="HZ", help="frames a second (default 4)")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--token", default="", help="bearer token of the service, if it wants one")
+    parser.add_argument(
+        "--token-file", metavar="FILE", help="file with a token of the service (default: $ROISEARCH_TOKEN)"
+    )
     parser.add_argument(
         "--patience", type=float, default=10.0, metavar="S", help="give up on a silent service"
     )
     options = parser.parse_args(arguments)
-    headers = {"Authorization": f"Bearer {options.token}"} if options.token else {}
+    try:
+        token = _token(options.token_file)
+    except (OSError, UnicodeDecodeError) as error:
+        print(f"roisearch-sim detector: the token cannot be read ({error})", file=sys.stderr)
+        return 2
+    headers = {"Authorization": f"Bearer {token}"} if token else {}
     detector = Detector(options.target, options.p_tp, options.p_tn, options.seed)
     with httpx.Client(base_url=options.service, headers=headers, timeout=5.0) as client:
         try:

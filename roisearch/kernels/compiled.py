@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
@@ -24,8 +25,14 @@ def _cache_folder() -> Path:
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
-    users = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "roisearch"
-    base = Path(os.environ.get("NUMBA_CACHE_DIR") or users)
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        base = Path(chosen)
+    else:
+        try:
+            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "roisearch"
+        except RuntimeError:  # a service's user may have no home
+            base = Path(tempfile.gettempdir()) / "roisearch"
     return base / f"kernels-{digest.hexdigest()[:12]}"
 
 

@@ -74,4 +74,4 @@ class GreedyPlanner:
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use, by making some on a small map."""
-        warm_up(GreedyPlanner(fov=self._fov), self._fov, progress)
+        warm_up(lambda ground: GreedyPlanner(fov=self._fov, flyable=ground), self._fov, progress)

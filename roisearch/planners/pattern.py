@@ -136,7 +136,7 @@ class PatternPlanner:
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use, by making some on a small map."""
-        warm_up(type(self)(fov=self._fov), self._fov, progress)
+        warm_up(lambda ground: type(self)(fov=self._fov, flyable=ground), self._fov, progress)
 
 
 class CoveragePlanner(PatternPlanner):

@@ -97,4 +97,4 @@ class DirectPolicySearch:
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use, by making some on a small map."""
-        warm_up(DirectPolicySearch(fov=self._fov), self._fov, progress)
+        warm_up(lambda ground: DirectPolicySearch(fov=self._fov, flyable=ground), self._fov, progress)

@@ -9,6 +9,7 @@ from service.mavlink.errors import CommandFailed, LinkError, NotPermitted, NoVeh
 from service.mavlink.history import Pose, PoseHistory
 from service.mavlink.modes import ModeKind
 from service.mavlink.settings import LinkSettings
+from service.mavlink.signing import read_signing_key
 from service.mavlink.telemetry import Home, Telemetry, Wind
 from service.mavlink.vehicle import Vehicle
 
@@ -25,4 +26,5 @@ __all__ = [
     "Telemetry",
     "Vehicle",
     "Wind",
+    "read_signing_key",
 ]

@@ -50,6 +50,7 @@ from service.mavlink.framing import Codec, Message, Receiver, own_heartbeat
 from service.mavlink.history import PoseHistory
 from service.mavlink.readiness import Readiness
 from service.mavlink.settings import LinkSettings
+from service.mavlink.signing import Signer
 from service.mavlink.streams import Streams, common_streams
 from service.mavlink.target import Step, TargetWatch
 from service.mavlink.telemetry import READERS, Telemetry, after_reboot, heartbeat, stopping_point
@@ -82,7 +83,9 @@ class LinkCore:
         self.bytes_received = 0
         self.messages_received = 0
         self._speaks_first = speaks_first
-        self._codec = Codec(settings.system_id or _BEFORE_PAIRING_SYSTEM, settings.component_id)
+        self.signer = Signer(settings.signing_key) if settings.signing_key is not None else None
+        """What signs and checks signatures, if there is a key; its timestamp is the owner's to keep."""
+        self._codec = Codec(settings.system_id or _BEFORE_PAIRING_SYSTEM, settings.component_id, self.signer)
         self._receiver = Receiver(self._codec)
         self._boot = BootClock()
         self._streams = Streams(())
@@ -141,6 +144,11 @@ class LinkCore:
         """The frames to send now, in order, each to be one datagram; they are handed out once."""
         frames, self._outgoing = self._outgoing, []
         return frames
+
+    @property
+    def frames_refused(self) -> int:
+        """How many good frames were not believed, because they were not signed with our key."""
+        return self._codec.refused
 
     @property
     def paired(self) -> bool:
@@ -261,9 +269,9 @@ class LinkCore:
 
     def _take(self, message: Message, source: Hashable, now: float) -> None:
         self.messages_received += 1
-        if message.get_srcComponent() != _AUTOPILOT:
-            return
         name = message.get_type()
+        if message.get_srcComponent() != _AUTOPILOT or name == "RADIO_STATUS":
+            return  # a radio's word is never the autopilot's: it needs no signature
         if not self.paired:
             if name == "HEARTBEAT":
                 self._pair(message, source, now)

@@ -5,7 +5,9 @@ pymavlink's own stream parser believes the length byte of anything that begins w
 the frame that would begin there is wrong, it goes on with the very next byte, so noise never costs a good
 frame, and a guess that stays incomplete for too long is given up as well.
 
-Signing has its place here: `Codec` owns the one `MAVLink` object that checks and makes signatures.
+With a `Signer`, `Codec` signs every frame that goes out and trusts no frame that is not signed, but RADIO_STATUS:
+it comes from the telemetry radio itself, which has no key, and the specification always lets it pass. The core
+takes no word of it for the vehicle's.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ from collections.abc import Hashable
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from service.mavlink.signing import Signer
 
 Message = Any
 """A message object of pymavlink's dialect (generated code, not typed)."""
@@ -29,8 +33,11 @@ _MOST_SOURCES = 8
 class Codec:
     """Checks and decodes single frames, and encodes our own messages with our identity and sequence."""
 
-    def __init__(self, system_id: int, component_id: int) -> None:
+    def __init__(self, system_id: int, component_id: int, signer: Signer | None = None) -> None:
         self._mav = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
+        self._signer = signer
+        self.refused = 0
+        """Good frames that were not signed as they should be."""
 
     @property
     def system_id(self) -> int:
@@ -47,10 +54,10 @@ class Codec:
         return int(self._mav.srcComponent)
 
     def encode(self, message: Message) -> bytes:
-        """One MAVLink 2 frame."""
+        """One MAVLink 2 frame, signed if there is a signer."""
         frame = bytes(message.pack(self._mav))
         self._mav.seq = (self._mav.seq + 1) % 256
-        return frame
+        return frame if self._signer is None else self._signer.sign(frame, message.crc_extra)
 
     def decode(self, frame: bytearray) -> Message | None:
         """The message in a whole frame, or None if its checksum, length or content is wrong."""
@@ -58,6 +65,20 @@ class Codec:
             return self._mav.decode(frame)
         except (mavlink.MAVError, struct.error):
             return None
+
+    def trusts(self, frame: bytearray, message: Message) -> bool:
+        """Whether a decoded frame may be believed; to be asked once for each."""
+        if self._signer is None or self._signer.verify(frame):
+            return True
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_RADIO_STATUS:
+            return True
+        self.refused += 1
+        return False
+
+    @property
+    def signs(self) -> bool:
+        """Whether only what is signed is believed."""
+        return self._signer is not None
 
 
 class Framer:
@@ -94,22 +115,26 @@ class Framer:
             if length is None or at + length > len(buffer):
                 if wait:
                     break
-                message = None
-            else:
-                message = self._codec.decode(buffer[at : at + length]) if length else None
-            if message is None or length is None or not self._plausible(message, at + length):
+                length = 0
+            frame = buffer[at : at + length]
+            message = self._codec.decode(frame) if frame else None
+            trusted = message is not None and self._codec.trusts(frame, message)
+            if message is None or not self._plausible(message, at + length, trusted):
                 at += 1
                 self.skipped += 1
                 continue
             at += length
-            messages.append(message)
+            if trusted:
+                messages.append(message)
         del buffer[:at]
         return messages
 
-    def _plausible(self, message: Message, end: int) -> bool:
-        """The checksum of an unknown message cannot be checked: its length is, by what follows."""
+    def _plausible(self, message: Message, end: int, trusted: bool) -> bool:
+        """The checksum of an unknown message cannot be checked: its signature is, or its length by what follows."""
         if message.get_msgId() >= 0:
             return True
+        if self._codec.signs:
+            return trusted
         return end == len(self._buffer) or self._buffer[end] in (_V1, _V2)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 _SHORTEST_SILENCE_WALL_S = 0.75
 _SHORTEST_ANSWER_WALL_S = 0.3
@@ -18,6 +19,10 @@ class LinkSettings:
     """Our own component: MAV_COMP_ID_ONBOARD_COMPUTER."""
     allow_arming: bool = False
     """Whether this process may arm and take off at all (`--takeoff`, or the built-in mock)."""
+    signing_key: bytes | None = field(default=None, repr=False)
+    """32 bytes: sign everything (MAVLink 2 signing) and believe nothing that is not signed with it."""
+    signing_timestamp_file: Path | None = None
+    """Where the signing timestamp outlives a restart."""
 
     position_hz: float = 10.0
     attitude_hz: float = 10.0

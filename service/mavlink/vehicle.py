@@ -26,6 +26,7 @@ from service.mavlink.core import LinkCore
 from service.mavlink.errors import CommandFailed, NotPermitted, NoVehicle
 from service.mavlink.events import Accepted, Cancelled, CommandDone, Outcome, Refused, Target, VehicleEvent
 from service.mavlink.history import Pose, PoseHistory
+from service.mavlink.keeper import TimestampKeeper
 from service.mavlink.settings import LinkSettings
 from service.mavlink.telemetry import Telemetry
 from service.mavlink.transports import Transport, make_transport
@@ -54,6 +55,7 @@ class Vehicle:
         self._queue: asyncio.Queue[VehicleEvent | None] = asyncio.Queue()
         self._changed = asyncio.Event()
         self._waiting: dict[int, asyncio.Future[Outcome]] = {}
+        self._keeper: TimestampKeeper | None = None
 
     @classmethod
     @contextlib.asynccontextmanager
@@ -63,12 +65,13 @@ class Vehicle:
         """Open the link and keep it up for as long as the block lasts.
 
         Raises:
-            BadInput: the address cannot be used.
+            BadInput: the address cannot be used, or the signing timestamp cannot be kept.
             LinkError: the port or device cannot be opened.
         """
         transport = make_transport(parse_url(url))
-        await transport.open()
         vehicle = cls(transport, clock, settings or LinkSettings())
+        vehicle._begin_signing()
+        await transport.open()
         failure: Exception | None = None
         try:
             async with asyncio.TaskGroup() as group:
@@ -76,6 +79,8 @@ class Vehicle:
                     group.create_task(transport.run(vehicle._pump), name="mavlink wire"),
                     group.create_task(vehicle._tick_for_ever(), name="mavlink tick"),
                 ]
+                if vehicle._keeper is not None:
+                    tasks.append(group.create_task(vehicle._keeper.run(), name="mavlink signing"))
                 try:
                     yield vehicle
                 except Exception as error:  # leaves as it is, not wrapped into the group of our tasks' errors
@@ -88,6 +93,12 @@ class Vehicle:
             vehicle._queue.put_nowait(None)
         if failure is not None:
             raise failure
+
+    def _begin_signing(self) -> None:
+        signer = self._core.signer
+        if signer is not None:
+            self._keeper = TimestampKeeper(signer, self.settings.signing_timestamp_file)
+            self._keeper.begin()
 
     # ---- what is known
 
@@ -159,6 +170,11 @@ class Vehicle:
             )
         if core.rejected:
             raise NoVehicle(f"the only autopilot heard on {where} cannot be flown: {core.rejected}")
+        if core.frames_refused and not core.messages_received:
+            raise NoVehicle(
+                f"MAVLink is heard on {where}, but not signed with our key ({core.frames_refused} frames refused); "
+                "is the key that of the vehicle, and does this link of it sign?"
+            )
         if core.messages_received:
             raise NoVehicle(f"MAVLink is heard on {where}, but no autopilot's heartbeat in {timeout_s:g} s")
         if core.bytes_received:

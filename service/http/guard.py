@@ -1,0 +1,261 @@
+"""What every request passes before the application sees it; the package says in which order.
+
+Plain ASGI rather than a framework's middleware, because it must see a body as it arrives: a chunked body has
+no Content-Length to check.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Message, Receive, Send
+from starlette.types import Scope as Request
+
+from service.config import HttpSettings
+from service.http.access import Access, Scope
+from service.http.address import LOOPBACK_NAMES, host_name
+from service.http.rate import Buckets
+
+READS = frozenset({"GET", "HEAD", "OPTIONS"})
+OPEN_PATHS = frozenset({"/", "/healthz"})
+"""Readable without a token: the page, which asks for one and holds nothing itself, and the sign of life."""
+REPORT_ROUTES = frozenset({("POST", "/api/reports"), ("GET", "/api/state"), ("HEAD", "/api/state")})
+"""What a report token opens."""
+
+_LINGER_S = 1.0
+_HEADERS = {
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",  # nobody lays our buttons under theirs
+    "referrer-policy": "no-referrer",
+    "cache-control": "no-store",
+}
+
+
+@dataclass(eq=False)
+class Refusal(Exception):
+    """Why a request goes no further."""
+
+    status: int
+    detail: str
+    retry_after_s: float = 0.0
+
+    def response(self, request: Request) -> JSONResponse:
+        """What to answer; the connection ends where a body may still be coming, which nobody will read."""
+        headers = dict(_HEADERS)
+        if request["method"] not in READS:
+            headers["connection"] = "close"
+        if self.status == 401:
+            headers["www-authenticate"] = "Bearer"
+        if self.retry_after_s:
+            headers["retry-after"] = str(max(1, math.ceil(self.retry_after_s)))
+        return JSONResponse({"detail": self.detail}, self.status, headers)
+
+
+class Guard:
+    """The application behind its checks.
+
+    Args:
+        names: the Host names of the address we listen on, beside those of loopback and of the settings.
+        any_address: we listen on every address of this machine, so the one a request came to is ours too.
+        buckets: the rate limits, shared with the application, which counts the reports in a batch.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        http: HttpSettings,
+        access: Access,
+        names: Sequence[str] = (),
+        any_address: bool = False,
+        buckets: Buckets,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._app = app
+        self._http = http
+        self._access = access
+        given = [*names, *http.allowed_hosts]
+        self._names = LOOPBACK_NAMES | {name for name in map(host_name, given) if name}
+        self._any_address = any_address
+        self._origins = frozenset(origin.lower().rstrip("/") for origin in http.allowed_origins)
+        self._buckets = buckets
+        self._now = now
+
+    async def __call__(self, scope: Request, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            raise RuntimeError(f"the door speaks HTTP only, not {scope['type']}")
+        headers, incoming = Headers(scope=scope), _Incoming(receive)
+        try:
+            self._check_host(scope, headers)
+            self._check_origin(scope, headers)
+            self._check_token(scope, headers)
+            self._check_rate(scope)
+            body = await self._body(headers, incoming)
+        except Refusal as refusal:
+            if _announces_body(headers):
+                await self._discard(incoming)
+            await refusal.response(scope)(scope, receive, send)
+            return
+
+        async def send_safely(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                fields = MutableHeaders(scope=message)
+                for name, value in _HEADERS.items():
+                    fields.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive if body is None else _replay(body, receive), send_safely)
+
+    def _check_host(self, request: Request, headers: Headers) -> None:
+        given = headers.getlist("host")
+        name = host_name(given[0]) if len(given) == 1 else None
+        if name is not None and name in self._names:
+            return
+        if name is not None and self._any_address and name == _local_address(request):
+            return
+        raise Refusal(421, "this is not a name of this service; http.allowed_hosts lists more of them")
+
+    def _check_origin(self, request: Request, headers: Headers) -> None:
+        """A page of another site may neither command nor report (RFC 6454; the Fetch standard's metadata)."""
+        reads = request["method"] in READS
+        origins = headers.getlist("origin")
+        if len(origins) == 1 and origins[0].lower() in self._origins:
+            return
+        opened = (
+            reads
+            and headers.get("sec-fetch-mode") == "navigate"
+            and headers.get("sec-fetch-dest") == "document"
+        )
+        if headers.get("sec-fetch-site", "none") not in ("same-origin", "none") and not opened:
+            raise Refusal(403, "a page of another site may not ask this service for anything")
+        if origins and not reads and not (len(origins) == 1 and _same(origins[0], headers["host"])):
+            raise Refusal(
+                403, "a page of another site may not do this; http.allowed_origins lists those that may"
+            )
+
+    def _check_token(self, request: Request, headers: Headers) -> None:
+        route = (request["method"], request["path"])
+        if not self._access.needed or (route[0] in READS and route[1] in OPEN_PATHS):
+            return
+        given = headers.getlist("authorization")
+        scope = self._access.scope_of(given[0]) if len(given) == 1 else None
+        if scope is None:
+            raise Refusal(401, "a bearer token is needed")
+        if scope is not Scope.COMMAND and route not in REPORT_ROUTES:
+            raise Refusal(403, f"a {scope.value} token does not open this; a command token does")
+
+    def _check_rate(self, request: Request) -> None:
+        """Reports, reading the state, commands and other reading each have a bucket of their own."""
+        reads, path = request["method"] in READS, request["path"]
+        frequent = path in ("/api/reports", "/api/state")
+        per_s = self._http.reports_per_s if frequent else self._http.commands_per_s
+        wait = self._buckets.take((client_of(request), reads, frequent), per_s, self._now())
+        if wait:
+            raise too_many(per_s, wait)
+
+    async def _body(self, headers: Headers, incoming: _Incoming) -> bytes | None:
+        """The whole body, within its limits; None when there is none."""
+        if not _announces_body(headers):
+            return None
+        length = headers.get("content-length", "")
+        most = self._http.max_body_bytes
+        too_large = Refusal(413, f"a request has at most {most} bytes")
+        if length and not (length.isascii() and length.isdigit() and len(length) < 16):
+            raise Refusal(400, "Content-Length is not a number of bytes")
+        if length and int(length) > most:
+            raise too_large
+        kind = headers.get("content-type", "").partition(";")[0].strip().lower()
+        if kind != "application/json":
+            raise Refusal(415, "a body is JSON: send Content-Type: application/json")
+        body = bytearray()
+        try:
+            async with asyncio.timeout(self._http.body_timeout_s):
+                while not incoming.ended:
+                    message = await incoming.receive()
+                    if message["type"] != "http.request":
+                        raise Refusal(400, "the connection was closed before the whole body had come")
+                    body += message.get("body", b"")
+                    if len(body) > most:
+                        raise too_large
+        except TimeoutError:
+            seconds = self._http.body_timeout_s
+            raise Refusal(408, f"the body did not come within {seconds:g} s") from None
+        return bytes(body)
+
+    async def _discard(self, incoming: _Incoming) -> None:
+        """Read on for a moment: a connection closed on what is still coming is reset before its answer is read."""
+        left = self._http.max_body_bytes
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_LINGER_S):
+                while left > 0 and not incoming.ended:
+                    left -= len((await incoming.receive()).get("body", b""))
+
+
+class _Incoming:
+    """The messages of a request, and whether its last one has come."""
+
+    def __init__(self, receive: Receive) -> None:
+        self._receive = receive
+        self.ended = False
+
+    async def receive(self) -> Message:
+        message = await self._receive()
+        self.ended = not message.get("more_body", False)
+        return message
+
+
+def _announces_body(headers: Headers) -> bool:
+    return headers.get("content-length", "0") not in ("", "0") or "transfer-encoding" in headers
+
+
+def client_of(request: Request) -> str:
+    """The address that a request came from; never what a header says it is."""
+    client = request.get("client")
+    return str(client[0]) if client else ""
+
+
+def too_many(per_s: float, wait_s: float) -> Refusal:
+    """The refusal of a request over the rate limit."""
+    return Refusal(429, f"more than {per_s:g} a second; try again in {wait_s:.1f} s", wait_s)
+
+
+def _local_address(request: Request) -> str | None:
+    server = request.get("server")
+    return str(server[0]).lower().partition("%")[0] if server else None
+
+
+def _same(origin: str, host: str) -> bool:
+    """Whether an Origin is that of a page which this service itself has sent to whom it is called `host`."""
+    try:
+        parts = urlsplit(origin)
+        port = parts.port
+    except ValueError:
+        return False
+    if parts.scheme not in ("http", "https") or not parts.netloc:
+        return False
+    usual = 443 if parts.scheme == "https" else 80
+    _, _, given = host.rpartition("]")[2].rpartition(":")
+    own_port = int(given) if given.isascii() and given.isdigit() else usual
+    return host_name(parts.netloc) == host_name(host) and (port or usual) == own_port
+
+
+def _replay(body: bytes, receive: Receive) -> Receive:
+    """A `receive` that first gives the body as one message."""
+    given = False
+
+    async def again() -> Message:
+        nonlocal given
+        if given:
+            return await receive()
+        given = True
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    return again

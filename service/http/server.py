@@ -1,0 +1,138 @@
+"""uvicorn on a socket of ours, with its patience limited."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import h11
+import uvicorn
+from fastapi import FastAPI
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from service.config import HttpSettings
+from service.http.access import Access, read_access
+from service.http.address import bind, bound_address, split_address, url_of
+from service.http.app import Run, create_app
+
+_MOST_CONNECTIONS = 256
+_MOST_HEADER_BYTES = 16_384
+_KEEP_ALIVE_S = 15
+_SHUTDOWN_S = 2
+
+
+@dataclass(frozen=True)
+class Door:
+    """An address that is ours, and who may enter there; nothing is served before `server`."""
+
+    http: HttpSettings
+    listener: socket.socket
+    access: Access
+
+    @property
+    def url(self) -> str:
+        """A URL by which this machine itself reaches the door."""
+        return url_of(self.listener)
+
+    def with_guest(self) -> tuple[Door, str]:
+        """This door with one more report token, and that token (empty where none is needed)."""
+        access, token = self.access.with_guest()
+        return replace(self, access=access), token
+
+    def server(self, run: Run) -> Server:
+        """A server of a run at this door."""
+        address = bound_address(self.listener)
+        name = split_address(self.http.listen)[0]
+        app = create_app(
+            run,
+            http=self.http,
+            access=self.access,
+            names=() if address.is_unspecified else (name if ":" not in name else f"[{name}]", f"{address}"),
+            any_address=address.is_unspecified,
+        )
+        return Server(app, self.listener, self.http)
+
+    def close(self) -> None:
+        """Give the address up."""
+        self.listener.close()
+
+
+def open_door(http: HttpSettings, environment: Mapping[str, str]) -> Door:
+    """Take the address and read the tokens, before anything else starts.
+
+    Raises:
+        BadInput: the address is not one or is taken, or a token is missing, unreadable or weak.
+    """
+    listener = bind(*split_address(http.listen))
+    try:
+        access = read_access(http, environment, loopback=bound_address(listener).is_loopback)
+    except BaseException:
+        listener.close()
+        raise
+    return Door(http, listener, access)
+
+
+class Impatient(H11Protocol):
+    """uvicorn's protocol that also hangs up on who does not come to the end of a request's headers."""
+
+    patience_s = 5.0
+    _hang_up: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """A client has connected."""
+        super().connection_made(transport)
+        self._watch()
+
+    def data_received(self, data: bytes) -> None:
+        """Some bytes of a request."""
+        super().data_received(data)
+        self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """The client is gone."""
+        super().connection_lost(exc)
+        if self._hang_up is not None:
+            self._hang_up.cancel()
+
+    def _watch(self) -> None:
+        waiting = self.conn.their_state is h11.IDLE
+        if waiting and self._hang_up is None:
+            self._hang_up = self.loop.call_later(self.patience_s, self.transport.close)
+        elif not waiting and self._hang_up is not None:
+            self._hang_up.cancel()
+            self._hang_up = None
+
+
+class Server(uvicorn.Server):
+    """uvicorn on our socket, leaving signals to the service."""
+
+    def __init__(self, app: FastAPI, listener: socket.socket, http: HttpSettings | None = None) -> None:
+        patience_s = (http or HttpSettings()).body_timeout_s
+        config = uvicorn.Config(
+            app,
+            http=type("Impatient", (Impatient,), {"patience_s": patience_s}),
+            ws="none",
+            lifespan="off",
+            log_level="warning",
+            access_log=False,  # a path may hold anything that somebody pasted into it
+            proxy_headers=False,  # who asks is who is connected, not who a header says
+            server_header=False,
+            limit_concurrency=_MOST_CONNECTIONS,
+            timeout_keep_alive=_KEEP_ALIVE_S,
+            timeout_graceful_shutdown=_SHUTDOWN_S,
+            h11_max_incomplete_event_size=_MOST_HEADER_BYTES,
+        )
+        super().__init__(config)
+        self._listener = listener
+
+    @contextlib.contextmanager
+    def capture_signals(self):  # type: ignore[no-untyped-def]
+        """No signal handlers of its own."""
+        yield
+
+    async def run_until_told(self) -> None:
+        """Serve until `should_exit` is set."""
+        await self.serve(sockets=[self._listener])

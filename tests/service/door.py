@@ -1,0 +1,106 @@
+"""A run that only remembers what it was asked, and its door: in memory, or on a real socket."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from typing import Any
+
+import httpx
+from prometheus_client import CollectorRegistry
+
+from service.config import HttpSettings
+from service.http import Access, Door, create_app, open_door
+from service.reports import Receipt, Report
+
+COMMAND, REPORT = "command-token-0123456789", "report-token-0123456789"
+HOLD = {"command": "hold"}
+FRAME = {"id": "a", "captured_at": 1.0}
+
+
+class FakeRun:
+    """Accepts everything and notes it down."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        self.reports: list[Report] = []
+        self.orders: list[str] = []
+
+    def state(self) -> dict[str, Any]:
+        return {"state": "SEARCHING"}
+
+    def map(self) -> dict[str, Any]:
+        return {"probability": []}
+
+    def picture(self) -> bytes:
+        return b"\x89PNG"
+
+    def ready(self) -> bool:
+        return True
+
+    async def submit(self, report: Report) -> Receipt:
+        self.reports.append(report)
+        return Receipt(id=report.id, status="accepted")
+
+    async def order(self, command: str) -> str:
+        self.orders.append(command)
+        return "HOLDING"
+
+
+def settings(**values: Any) -> HttpSettings:
+    """Settings of a door on a port that the system picks."""
+    return HttpSettings.model_validate({"listen": "127.0.0.1:0", **values})
+
+
+def both_tokens() -> dict[str, str]:
+    """An environment with a token of each scope."""
+    return {"ROISEARCH_HTTP_TOKEN": COMMAND, "ROISEARCH_HTTP_REPORT_TOKEN": REPORT}
+
+
+def bearer(token: str) -> dict[str, str]:
+    return {"authorization": f"Bearer {token}"}
+
+
+def in_memory(
+    run: FakeRun, *, http: HttpSettings | None = None, access: Access | None = None, **more: Any
+) -> httpx.AsyncClient:
+    """A client of the real application, without a socket; whatever the application raises is raised here."""
+    app = create_app(run, http=http, access=access, **more)
+    return httpx.AsyncClient(transport=httpx.ASGITransport(app=app), base_url="http://127.0.0.1:8080")
+
+
+@asynccontextmanager
+async def on_a_socket(
+    run: FakeRun, environment: Mapping[str, str] | None = None, **values: Any
+) -> AsyncIterator[Door]:
+    """The real server, on a real socket."""
+    door = open_door(settings(**values), environment or {})
+    server = door.server(run)
+    serving = asyncio.create_task(server.run_until_told())
+    try:
+        while not server.started:  # noqa: ASYNC110 - uvicorn has nothing to wait for
+            await asyncio.sleep(0.01)
+        yield door
+    finally:
+        server.should_exit = True
+        await serving
+        door.close()
+
+
+async def say(door: Door, data: bytes, *, pause_s: float = 0.0, patience_s: float = 20.0) -> bytes:
+    """Send raw bytes, wait, and read until the other side hangs up or has said nothing more for a while."""
+    port = door.listener.getsockname()[1]
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    try:
+        writer.write(data)
+        await asyncio.sleep(pause_s)
+        answer = b""
+        async with asyncio.timeout(patience_s):
+            while chunk := await reader.read(4096):
+                answer += chunk
+                if b"connection: close" not in answer and b"\r\n\r\n" in answer:
+                    break
+        return answer
+    finally:
+        writer.close()

@@ -1,0 +1,506 @@
+"""Who gets past the door, and who does not."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from service.config import HttpSettings
+from service.errors import BadInput
+from service.http import Access, open_door, read_access
+from service.http.address import host_name
+from service.http.rate import Buckets
+
+from .door import (
+    COMMAND,
+    FRAME,
+    HOLD,
+    REPORT,
+    FakeRun,
+    bearer,
+    both_tokens,
+    in_memory,
+    on_a_socket,
+    say,
+    settings,
+)
+
+
+def ask(
+    method: str,
+    path: str,
+    *,
+    json: Any = None,
+    headers: dict[str, str] | None = None,
+    access: Access | None = None,
+    http: HttpSettings | None = None,
+    run: FakeRun | None = None,
+    **more: Any,
+) -> httpx.Response:
+    """One request to a fresh door."""
+
+    async def once() -> httpx.Response:
+        async with in_memory(run or FakeRun(), http=http, access=access, **more) as client:
+            return await client.request(method, path, json=json, headers=headers)
+
+    return asyncio.run(once())
+
+
+TOKENS = read_access(settings(listen="0.0.0.0:0"), both_tokens(), loopback=False)
+
+
+# ---- tokens
+
+
+def test_on_loopback_no_token_is_needed() -> None:
+    assert ask("POST", "/api/commands", json=HOLD).status_code == 200
+
+
+@pytest.mark.parametrize("listen", ["0.0.0.0:0", "[::]:0"])
+def test_listening_beyond_loopback_without_a_token_is_refused_at_the_start(listen: str) -> None:
+    with pytest.raises(BadInput, match=r"needs a token.*http\.token_file.*ROISEARCH_HTTP_TOKEN"):
+        open_door(settings(listen=listen), {})
+    open_door(settings(listen=listen), both_tokens()).close()
+
+
+def test_every_address_of_loopback_is_loopback() -> None:
+    for listen in ("127.0.0.1:0", "127.0.0.9:0", "localhost:0", "[::1]:0"):
+        open_door(settings(listen=listen), {}).close()
+
+
+@pytest.mark.parametrize(
+    ("token", "status"),
+    [
+        (None, 401),
+        ("", 401),
+        ("wrong-token-0123456789", 401),
+        (COMMAND[:-1], 401),
+        (COMMAND + "x", 401),
+        (REPORT, 403),
+        (COMMAND, 200),
+    ],
+)
+def test_a_command_needs_the_command_token(token: str | None, status: int) -> None:
+    run = FakeRun()
+    headers = bearer(token) if token is not None else {}
+    answer = ask("POST", "/api/commands", json=HOLD, headers=headers, access=TOKENS, run=run)
+    assert answer.status_code == status
+    assert run.orders == (["hold"] if status == 200 else [])
+    assert ("www-authenticate" in answer.headers) == (status == 401)
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [
+        ("GET", "/api/state", 200),
+        ("GET", "/api/map", 403),
+        ("GET", "/api/map.png", 403),
+        ("GET", "/metrics", 403),
+        ("GET", "/docs", 403),
+        ("GET", "/openapi.json", 403),
+        ("GET", "/readyz", 403),
+        ("DELETE", "/api/reports", 403),
+        ("GET", "/healthz", 200),
+    ],
+)
+def test_a_report_token_opens_reports_and_the_state_and_nothing_else(
+    method: str, path: str, status: int
+) -> None:
+    assert ask(method, path, headers=bearer(REPORT), access=TOKENS).status_code == status
+    assert ask("POST", "/api/reports", json=FRAME, headers=bearer(REPORT), access=TOKENS).status_code == 200
+
+
+def test_only_the_page_and_the_sign_of_life_are_open_without_a_token() -> None:
+    open_paths = {
+        path
+        for path in (
+            "/",
+            "/healthz",
+            "/readyz",
+            "/metrics",
+            "/docs",
+            "/openapi.json",
+            "/api/state",
+            "/api/map",
+        )
+        if ask("GET", path, access=TOKENS).status_code == 200
+    }
+    assert open_paths == {"/", "/healthz"}
+    assert ask("POST", "/", json={}, access=TOKENS).status_code == 401
+
+
+def test_another_scheme_than_bearer_and_two_tokens_at_once_are_refused() -> None:
+    assert TOKENS.scope_of(f"Basic {COMMAND}") is None
+    assert TOKENS.scope_of(COMMAND) is None
+    assert TOKENS.scope_of(f"bearer  {COMMAND} ") is not None
+
+    async def twice() -> int:
+        async with in_memory(FakeRun(), access=TOKENS) as client:
+            pairs = [("authorization", f"Bearer {token}") for token in (COMMAND, COMMAND)]
+            return (await client.get("/api/map", headers=httpx.Headers(pairs))).status_code
+
+    assert asyncio.run(twice()) == 401
+
+
+def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    compared: list[tuple[int, int]] = []
+
+    def compare(a: bytes, b: bytes) -> bool:
+        compared.append((len(a), len(b)))
+        return a == b
+
+    monkeypatch.setattr("service.http.access.hmac.compare_digest", compare)
+    for token in ("", "x", COMMAND, REPORT, "y" * 4000):
+        compared.clear()
+        TOKENS.scope_of(f"Bearer {token}")
+        assert compared == [(32, 32), (32, 32)]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [("short", "at least 16"), ("", "is empty"), ("two words of a token", "one line"), ("ü" * 16, "ASCII")],
+)
+def test_a_weak_token_is_refused_without_being_shown(tmp_path: Path, content: str, words: str) -> None:
+    file = tmp_path / "token"
+    file.write_text(content)
+    with pytest.raises(BadInput, match=words) as caught:
+        read_access(settings(token_file=str(file)), {}, loopback=True)
+    assert not content or content not in str(caught.value)
+
+
+def test_a_report_token_alone_or_twice_the_same_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    file.write_text(REPORT + "\n")
+    report_only = settings(report_token_file=str(file))
+    with pytest.raises(BadInput, match="nobody to give commands"):
+        read_access(report_only, {}, loopback=True)
+    with pytest.raises(BadInput, match="the same"):
+        read_access(report_only, {"ROISEARCH_HTTP_TOKEN": REPORT}, loopback=True)
+    with pytest.raises(BadInput, match="cannot be read"):
+        read_access(settings(token_file=str(tmp_path / "none")), {}, loopback=True)
+
+
+def test_a_guest_token_reports_and_does_not_command() -> None:
+    access, token = TOKENS.with_guest()
+    assert ask("POST", "/api/reports", json=FRAME, headers=bearer(token), access=access).status_code == 200
+    assert ask("POST", "/api/commands", json=HOLD, headers=bearer(token), access=access).status_code == 403
+    assert Access().with_guest() == (Access(), "")
+
+
+def test_no_object_of_the_door_shows_a_token(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    file = tmp_path / "token"
+    file.write_text(COMMAND)
+    file.chmod(0o644)
+    given = settings(token_file=str(file))
+    door = open_door(given, {"ROISEARCH_HTTP_REPORT_TOKEN": REPORT})
+    try:
+        shown = f"{door!r} {door.access!r} {given!r} {given.model_dump_json()} {caplog.text}"
+    finally:
+        door.close()
+    assert "every user of this machine can read the token" in caplog.text
+    assert COMMAND not in shown
+    assert REPORT not in shown
+
+
+# ---- names and pages of others
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("127.0.0.1:8080", 200),
+        ("localhost", 200),
+        ("LOCALHOST.:9", 200),
+        ("[::1]:8080", 200),
+        ("drone7.local", 200),
+        ("search.example", 200),
+        ("evil.example", 421),
+        ("127.0.0.1.evil.example", 421),
+        ("localhost@evil.example", 421),
+        ("127.0.0.1:80:80", 421),
+        ("[::1", 421),
+        ("127.0.0.1:x", 421),
+        ("", 421),
+    ],
+)
+def test_only_our_own_names_are_answered_to(host: str, status: int) -> None:
+    """A name that somebody else made resolve to this machine is DNS rebinding."""
+    run = FakeRun()
+    http = settings(allowed_hosts=["Drone7.local"])
+    headers = {"host": host}
+    answer = ask(
+        "POST", "/api/commands", json=HOLD, headers=headers, http=http, run=run, names=["search.example"]
+    )
+    assert answer.status_code == status
+    assert bool(run.orders) == (status == 200)
+    assert ask("GET", "/", headers=headers, http=http, names=["search.example"]).status_code == status
+
+
+def test_listening_everywhere_the_address_that_was_called_is_a_name_of_ours() -> None:
+    async def scenario() -> None:
+        async with on_a_socket(FakeRun(), both_tokens(), listen="0.0.0.0:0") as door:
+            port = door.listener.getsockname()[1]
+            async with httpx.AsyncClient(headers=bearer(COMMAND)) as client:
+                own = await client.get(f"http://127.0.0.9:{port}/api/state")
+                other = await client.get(f"http://127.0.0.9:{port}/api/state", headers={"host": "10.1.2.3"})
+                named = await client.get(f"{door.url}/api/state")
+        assert (own.status_code, other.status_code, named.status_code) == (200, 421, 200)
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({}, 200),
+        ({"origin": "http://127.0.0.1:8080"}, 200),
+        ({"origin": "http://127.0.0.1:8080", "sec-fetch-site": "same-origin"}, 200),
+        ({"origin": "https://ops.example", "sec-fetch-site": "cross-site"}, 200),
+        ({"origin": "http://127.0.0.1:9999"}, 403),
+        ({"origin": "http://127.0.0.1"}, 403),
+        ({"origin": "http://localhost:8080"}, 403),
+        ({"origin": "https://evil.example"}, 403),
+        ({"origin": "http://127.0.0.1:8080.evil.example"}, 403),
+        ({"origin": "http://127.0.0.1:8080@evil.example"}, 403),
+        ({"origin": "null"}, 403),
+        ({"origin": "file://"}, 403),
+        ({"origin": "http://[::1"}, 403),
+        ({"sec-fetch-site": "cross-site"}, 403),
+        ({"sec-fetch-site": "same-site"}, 403),
+    ],
+)
+def test_a_page_of_another_site_neither_commands_nor_reports(headers: dict[str, str], status: int) -> None:
+    run = FakeRun()
+    http = settings(allowed_origins=["https://ops.example/"])
+    for path, body in (("/api/commands", HOLD), ("/api/reports", FRAME)):
+        assert ask("POST", path, json=body, headers=headers, http=http, run=run).status_code == status
+    assert (len(run.orders), len(run.reports)) == ((1, 1) if status == 200 else (0, 0))
+
+
+def test_a_page_of_another_site_cannot_even_use_up_our_rate() -> None:
+    embedded = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "no-cors", "sec-fetch-dest": "image"}
+    followed = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate", "sec-fetch-dest": "document"}
+    assert ask("GET", "/api/map.png", headers=embedded).status_code == 403
+    assert ask("GET", "/", headers=followed).status_code == 200
+
+
+def test_a_configured_site_gets_its_preflight_answered_and_no_other_does() -> None:
+    http = settings(allowed_origins=["https://ops.example"])
+    asked = {"access-control-request-method": "POST", "access-control-request-headers": "authorization"}
+    for origin, allowed in (("https://ops.example", "https://ops.example"), ("https://evil.example", None)):
+        answer = ask(
+            "OPTIONS", "/api/commands", headers={"origin": origin, **asked}, http=http, access=TOKENS
+        )
+        assert answer.headers.get("access-control-allow-origin") == allowed
+    answer = ask("GET", "/api/state", headers={"origin": "https://ops.example"})
+    assert "access-control-allow-origin" not in answer.headers
+
+
+def test_a_host_header_is_read_as_browsers_write_it() -> None:
+    assert host_name("[2001:DB8::1]:80") == "2001:db8::1"
+    assert host_name("a.b.") == "a.b"
+    assert [host_name(text) for text in ("", ":80", "[]", "a:b", "[::1]x")] == [None] * 5
+
+
+def test_the_page_runs_only_its_own_script_and_in_nobody_elses_frame() -> None:
+    answer = ask("GET", "/")
+    policy = answer.headers["content-security-policy"]
+    assert re.search(r"script-src 'self' 'sha256-[A-Za-z0-9+/=]+'", policy)
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "onclick=" not in answer.text  # handlers in attributes would not run under this policy
+    assert answer.headers["x-frame-options"] == "DENY"
+
+
+# ---- bodies
+
+
+@pytest.mark.parametrize(
+    "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data; boundary=x", "", None]
+)
+def test_a_body_that_is_not_called_json_is_refused(kind: str | None) -> None:
+    """What a form or a script of another site can send without asking first is none of these types."""
+
+    async def once() -> int:
+        async with in_memory(run) as client:
+            headers = {"content-type": kind} if kind is not None else {}
+            return (
+                await client.post("/api/commands", content=b'{"command":"hold"}', headers=headers)
+            ).status_code
+
+    run = FakeRun()
+    assert asyncio.run(once()) == 415
+    assert run.orders == []
+
+
+def test_json_with_a_character_set_is_json() -> None:
+    async def once() -> int:
+        async with in_memory(FakeRun()) as client:
+            headers = {"content-type": "Application/JSON; charset=utf-8"}
+            return (
+                await client.post("/api/commands", content=b'{"command":"hold"}', headers=headers)
+            ).status_code
+
+    assert asyncio.run(once()) == 200
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_a_body_over_the_limit_is_refused_however_it_comes(chunked: bool) -> None:
+    async def scenario() -> None:
+        run = FakeRun()
+        async with (
+            on_a_socket(run, max_body_bytes=2000) as door,
+            httpx.AsyncClient(base_url=door.url) as client,
+        ):
+            for size, status in ((1500, 200), (3000, 413)):
+                body = b'{"command": "hold"' + b" " * (size - 19) + b"}"
+
+                async def pieces(body: bytes = body) -> Any:
+                    for at in range(0, len(body), 100):
+                        yield body[at : at + 100]
+
+                content = pieces() if chunked else body
+                headers = {"content-type": "application/json"}
+                answer = await client.post("/api/commands", content=content, headers=headers)
+                assert answer.status_code == status
+                assert ("transfer-encoding" in answer.request.headers) == chunked
+        assert run.orders == ["hold"]
+
+    asyncio.run(scenario())
+
+
+def test_an_endless_chunked_body_is_cut_off_at_the_limit() -> None:
+    async def scenario() -> bytes:
+        async with on_a_socket(FakeRun(), max_body_bytes=2000) as door:
+            head = b"POST /api/reports HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+            chunk = b"3e8\r\n" + b"[" * 1000 + b"\r\n"
+            return await say(door, head + b"Transfer-Encoding: chunked\r\n\r\n" + chunk * 3)
+
+    assert asyncio.run(scenario()).startswith(b"HTTP/1.1 413 ")
+
+
+@pytest.mark.parametrize(
+    ("data", "status"),
+    [
+        (b"POST /api/reports HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+         b"Content-Length: 100\r\n\r\n{", b"HTTP/1.1 408 "),
+        (b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-Slow: ", b""),
+        (b"", b""),
+    ],
+    ids=["body", "headers", "silence"],
+)  # fmt: skip
+def test_who_is_too_slow_is_hung_up_on(data: bytes, status: bytes) -> None:
+    async def scenario() -> bytes:
+        async with on_a_socket(FakeRun(), body_timeout_s=0.3) as door:
+            return await say(door, data)
+
+    answer = asyncio.run(scenario())
+    assert answer.startswith(status)
+    assert bool(answer) == bool(status)
+
+
+def test_a_connection_between_two_requests_is_not_hung_up_on() -> None:
+    async def scenario() -> None:
+        async with on_a_socket(FakeRun(), body_timeout_s=0.2) as door, httpx.AsyncClient() as client:
+            kept = []
+            for _ in range(2):
+                answer = await client.get(f"{door.url}/healthz")
+                kept.append(answer.extensions["network_stream"].get_extra_info("client_addr"))
+                await asyncio.sleep(0.6)
+        assert kept[0] == kept[1]
+
+    asyncio.run(scenario())
+
+
+def test_a_batch_over_the_limit_is_refused_whole() -> None:
+    run = FakeRun()
+    batch = [{**FRAME, "id": f"{n}"} for n in range(11)]
+    http = settings(max_batch=10)
+    assert ask("POST", "/api/reports", json=batch, http=http, run=run).status_code == 413
+    assert run.reports == []
+    assert ask("POST", "/api/reports", json=batch[:10], http=http, run=run).status_code == 200
+    assert len(run.reports) == 10
+
+
+# ---- rates
+
+
+def test_a_bucket_lets_its_rate_through_and_no_more() -> None:
+    buckets = Buckets(burst_s=2.0)
+    waits = [buckets.take("a", 10.0, 0.0) for _ in range(21)]
+    assert waits[:20] == [0.0] * 20
+    assert waits[20] == pytest.approx(0.1)
+    assert buckets.take("b", 10.0, 0.0) == 0.0
+    passed = sum(buckets.take("a", 10.0, 1.0) == 0.0 for _ in range(30))
+    assert passed == 10
+    assert buckets.take("a", 10.0, 0.5) > 0.0  # a clock that goes back fills nothing
+
+
+def test_a_batch_larger_than_the_bucket_passes_once_and_is_paid_back() -> None:
+    buckets = Buckets(burst_s=2.0)
+    assert buckets.take("a", 10.0, 0.0, 50) == 0.0
+    assert buckets.take("a", 10.0, 2.0) > 0.0
+    assert buckets.take("a", 10.0, 4.0) == 0.0
+
+
+async def statuses(client: httpx.AsyncClient, count: int, path: str, body: Any) -> list[int]:
+    answers = [await client.post(path, json=body) for _ in range(count)]
+    for answer in answers:
+        assert (answer.status_code == 429) == ("retry-after" in answer.headers)
+    return [answer.status_code for answer in answers]
+
+
+def test_commands_are_limited_and_a_flood_of_them_stops_neither_reports_nor_reading() -> None:
+    async def scenario() -> None:
+        run = FakeRun()
+        async with in_memory(run, http=settings(commands_per_s=1)) as client:
+            assert 429 in await statuses(client, 10, "/api/commands", HOLD)
+            assert len(run.orders) < 10
+            assert set(await statuses(client, 10, "/api/reports", FRAME)) == {200}
+            assert (await client.get("/api/state")).status_code == 200
+            assert (await client.get("/metrics")).status_code == 200
+
+    asyncio.run(scenario())
+
+
+def test_a_flood_of_reports_in_batches_is_limited_and_stops_no_command() -> None:
+    async def scenario() -> None:
+        async with in_memory(FakeRun(), http=settings(reports_per_s=50, max_batch=100)) as client:
+            batch = [{**FRAME, "id": f"{n}"} for n in range(60)]
+            assert await statuses(client, 3, "/api/reports", batch) == [200, 429, 429]
+            assert (await client.post("/api/commands", json=HOLD)).status_code == 200
+
+    asyncio.run(scenario())
+
+
+def test_five_hundred_reports_a_second_pass_by_default() -> None:
+    buckets, http = Buckets(), HttpSettings()
+    times = [n / 500 for n in range(5000)]
+    assert all(buckets.take("a", http.reports_per_s, now) == 0.0 for now in times)
+
+
+def test_refused_requests_do_not_use_up_the_rate_of_those_with_a_token() -> None:
+    async def scenario() -> int:
+        async with in_memory(FakeRun(), http=settings(commands_per_s=1), access=TOKENS) as client:
+            assert set(await statuses(client, 20, "/api/commands", HOLD)) == {401}
+            return (await client.post("/api/commands", json=HOLD, headers=bearer(COMMAND))).status_code
+
+    assert asyncio.run(scenario()) == 200
+
+
+def test_a_forwarded_address_in_a_header_does_not_make_another_client() -> None:
+    async def scenario() -> list[int]:
+        async with on_a_socket(FakeRun(), commands_per_s=1) as door, httpx.AsyncClient() as client:
+            return [
+                (
+                    await client.get(f"{door.url}/readyz", headers={"x-forwarded-for": f"10.0.0.{n}"})
+                ).status_code
+                for n in range(10)
+            ]
+
+    assert 429 in asyncio.run(scenario())

@@ -164,7 +164,8 @@ def _steps_by_planner(rows: list[dict[str, Any]], summary: dict[str, Any]) -> Fi
         _note(
             axes,
             "Published medians are printed only in relation to another planner, so they stand relative to ours: "
-            "Lite 61 % above Regions,\nGreedy 6934 steps above PUCT but not beyond the limit, DPS at the limit (over half of its trials).",
+            "Lite 61 % above Regions,\nGreedy 6934 steps above PUCT but not beyond the limit, DPS at the limit (over "
+            "half of its trials).",
         )
     return figure
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -11,7 +11,7 @@ import httpx
 from prometheus_client import CollectorRegistry
 
 from service.config import HttpSettings
-from service.http import Access, Door, create_app, open_door
+from service.http import Access, Door, Server, create_app, open_door
 from service.reports import Receipt, Report
 
 COMMAND, REPORT = "command-token-0123456789", "report-token-0123456789"
@@ -71,12 +71,12 @@ def in_memory(
 
 
 @asynccontextmanager
-async def on_a_socket(
-    run: FakeRun, environment: Mapping[str, str] | None = None, **values: Any
-) -> AsyncIterator[Door]:
-    """The real server, on a real socket."""
-    door = open_door(settings(**values), environment or {})
+async def on_a_socket(run: FakeRun, *, any_address: bool = False, **values: Any) -> AsyncIterator[Door]:
+    """The real server, on a real socket; with `any_address` it takes that for one of many that it listens on."""
+    door = open_door(settings(**values), {})
     server = door.server(run)
+    if any_address:
+        server = Server(create_app(run, http=door.http, any_address=True), door.listener)
     serving = asyncio.create_task(server.run_until_told())
     try:
         while not server.started:  # noqa: ASYNC110 - uvicorn has nothing to wait for

@@ -12,7 +12,7 @@ import pytest
 
 from service.config import HttpSettings
 from service.errors import BadInput
-from service.http import Access, open_door, read_access
+from service.http import Access, open_door, read_access, url_of
 from service.http.address import host_name
 from service.http.rate import Buckets
 
@@ -51,7 +51,7 @@ def ask(
     return asyncio.run(once())
 
 
-TOKENS = read_access(settings(listen="0.0.0.0:0"), both_tokens(), loopback=False)
+TOKENS = read_access(settings(), both_tokens(), loopback=False)
 
 
 # ---- tokens
@@ -61,11 +61,39 @@ def test_on_loopback_no_token_is_needed() -> None:
     assert ask("POST", "/api/commands", json=HOLD).status_code == 200
 
 
-@pytest.mark.parametrize("listen", ["0.0.0.0:0", "[::]:0"])
-def test_listening_beyond_loopback_without_a_token_is_refused_at_the_start(listen: str) -> None:
+class Unbound:
+    """Stands in for a socket on an address of the network: tests bind to loopback only."""
+
+    def __init__(self, host: str) -> None:
+        self.host, self.closed = host, False
+
+    def getsockname(self) -> tuple[str, int]:
+        return self.host, 8080
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "fe80::1%eth0"])
+def test_listening_beyond_loopback_without_a_token_is_refused_at_the_start(
+    host: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listener = Unbound(host)
+    monkeypatch.setattr("service.http.server.bind", lambda *_: listener)
     with pytest.raises(BadInput, match=r"needs a token.*http\.token_file.*ROISEARCH_HTTP_TOKEN"):
-        open_door(settings(listen=listen), {})
-    open_door(settings(listen=listen), both_tokens()).close()
+        open_door(settings(listen="drone7.local:8080"), {})
+    assert listener.closed
+    assert open_door(settings(listen="drone7.local:8080"), both_tokens()).access.needed
+
+
+def test_the_service_itself_reaches_a_door_on_every_address_by_loopback() -> None:
+    urls = [url_of(Unbound(host)) for host in ("0.0.0.0", "::", "127.0.0.9", "fe80::1%eth0")]  # type: ignore[arg-type]
+    assert urls == [
+        "http://127.0.0.1:8080",
+        "http://[::1]:8080",
+        "http://127.0.0.9:8080",
+        "http://[fe80::1]:8080",
+    ]
 
 
 def test_every_address_of_loopback_is_loopback() -> None:
@@ -242,16 +270,14 @@ def test_only_our_own_names_are_answered_to(host: str, status: int) -> None:
 
 
 def test_listening_everywhere_the_address_that_was_called_is_a_name_of_ours() -> None:
-    async def scenario() -> None:
-        async with on_a_socket(FakeRun(), both_tokens(), listen="0.0.0.0:0") as door:
-            port = door.listener.getsockname()[1]
-            async with httpx.AsyncClient(headers=bearer(COMMAND)) as client:
-                own = await client.get(f"http://127.0.0.9:{port}/api/state")
-                other = await client.get(f"http://127.0.0.9:{port}/api/state", headers={"host": "10.1.2.3"})
-                named = await client.get(f"{door.url}/api/state")
-        assert (own.status_code, other.status_code, named.status_code) == (200, 421, 200)
+    async def scenario() -> list[int]:
+        everywhere = on_a_socket(FakeRun(), any_address=True, listen="127.0.0.9:0")
+        async with everywhere as door, httpx.AsyncClient() as client:
+            hosts = ("127.0.0.9", "127.0.0.1", "10.1.2.3", "evil.example")
+            asked = [client.get(f"{door.url}/healthz", headers={"host": host}) for host in hosts]
+            return [answer.status_code for answer in await asyncio.gather(*asked)]
 
-    asyncio.run(scenario())
+    assert asyncio.run(scenario()) == [200, 200, 421, 421]
 
 
 @pytest.mark.parametrize(

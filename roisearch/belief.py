@@ -134,7 +134,7 @@ class Belief:
             ValueError: when a cell is not on the map, a probability is not one, or no target anywhere can
                 explain the observation. The belief is then as it was.
         """
-        at = np.ascontiguousarray(cells, dtype=np.int64)
+        at = np.array(cells, dtype=np.int64, order="C")  # a copy: kernels are compiled for writable arrays
         if at.size == 0:
             return
         if at.ndim != 2 or at.shape[1] != 2:
@@ -268,7 +268,7 @@ def _flags(value: ArrayLike, k: int) -> NDArray[np.bool_]:
     """`value` as bool [k], or [1] for all looks alike."""
     if isinstance(value, bool):
         return _YES_NO[value]
-    array = np.ascontiguousarray(value, dtype=np.bool_)
+    array = np.array(value, dtype=np.bool_, order="C")
     if array.shape not in ((k,), (1,)):
         raise ValueError(f"hits must be one for each of the {k} cells, not of shape {array.shape}")
     return array
@@ -282,7 +282,7 @@ def _numbers(value: ArrayLike, k: int, name: str) -> NDArray[np.float64]:
                 _KNOWN.clear()
             _KNOWN[value] = np.array([value])
         return _KNOWN[value]
-    array = np.ascontiguousarray(value, dtype=np.float64)
+    array = np.array(value, dtype=np.float64, order="C")
     if array.shape not in ((k,), (1,)):
         raise ValueError(
             f"{name} must be one number or one for each of the {k} cells, not of shape {array.shape}"

@@ -31,7 +31,8 @@ def segment_regions(
     """Grow a region from each local maximum down to `threshold` or to the border of the next region.
 
     A seed is a cell at least as probable as every cell within two rows and columns (as peak_local_max with
-    min_distance=2); a flat top of equal cells is one seed, not many. The watershed of -prior grows them.
+    min_distance=2); a flat top of equal cells is one seed, not many. The watershed of -prior grows them. A piece
+    above the threshold that no seed reaches stays in no region, as in the paper's method.
 
     Args:
         prior: float [rows, cols].

@@ -45,6 +45,7 @@ def parser() -> argparse.ArgumentParser:
         type=float,
         help="how much faster than real time the mock or simulator flies",
     )
+    p.add_argument("--resume", metavar="RUN", type=Path, help="go on with the search of a run's folder")
     p.add_argument("--seed", metavar="S", type=int, help="seed of everything random (default: 1)")
     return p
 
@@ -52,31 +53,32 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the service; returns the exit code."""
     options = parser().parse_args(arguments)
-    if options.area is None:
-        print("roisearch-service: --area FILE is needed, such as --area config/area.geojson", file=sys.stderr)
+    if (options.area is None) == (options.resume is None):
+        print(
+            "roisearch-service: give --area FILE, such as config/area.geojson, or --resume RUN",
+            file=sys.stderr,
+        )
         return 2
     from service.errors import BadInput
 
+    flags = {
+        "link.connect": options.connect,
+        "flight.takeoff": options.takeoff or None,
+        "http.listen": options.http,
+        "run.folder": options.runs,
+        "run.seed": options.seed,
+        "search.planner": options.planner,
+        "sensor.cell_m": options.cell,
+        "demo.flavor": options.flavor,
+        "link.speedup": options.speedup,
+    }
     try:
         from service.config import read_settings
+        from service.run import resume, run
 
-        settings = read_settings(
-            options.config,
-            flags={
-                "link.connect": options.connect,
-                "flight.takeoff": options.takeoff or None,
-                "http.listen": options.http,
-                "run.folder": options.runs,
-                "run.seed": options.seed,
-                "search.planner": options.planner,
-                "sensor.cell_m": options.cell,
-                "demo.flavor": options.flavor,
-                "link.speedup": options.speedup,
-            },
-        )
-        from service.run import run
-
-        return run(options.area, options.prior, settings)
+        if options.resume is not None:
+            return resume(options.resume, flags)
+        return run(options.area, options.prior, read_settings(options.config, flags=flags))
     except BadInput as error:
         print(f"roisearch-service: {error}", file=sys.stderr)
         return 2

@@ -186,7 +186,15 @@ def read_settings(
             values.setdefault(section, {})[key] = variables[name]
             where = f"environment variable {name}"
             _check(values, where)
-    for dotted, value in (flags or {}).items():
+    return changed_settings(values, flags or {}, where)
+
+
+def changed_settings(values: dict[str, Any], changed: Mapping[str, Any], where: str) -> Settings:
+    """Settings from `values` (tables by section, named `where`) with some 'section.key' changed; None: not.
+
+    Raises BadInput in one sentence.
+    """
+    for dotted, value in changed.items():
         if value is not None:
             section, key = dotted.split(".")
             values.setdefault(section, {})[key] = value

@@ -37,7 +37,7 @@ class World:
         world = cls(draw(grid, settings.run.seed), "", settings)
         lat, lon = grid.launch
         demo = settings.demo
-        words = ["autopilot", "--flavor", demo.flavor, "--listen", "udpin://127.0.0.1:0"]
+        words = ["autopilot", "--attached", "--flavor", demo.flavor, "--listen", "udpin://127.0.0.1:0"]
         words += [f"--home={lat:.7f},{lon:.7f},{GROUND_AMSL_M:.0f}", "--speedup", f"{settings.speedup:g}"]
         words += ["--seed", str(settings.run.seed), "--endurance", f"{demo.endurance_min:g}"]
         process = await world.spawn(words)

@@ -143,18 +143,35 @@ class Journal:
                 entry.done.set_result(outcome)
 
 
-def read_rows(path: Path, *kinds: str) -> Iterator[Row]:
-    """The rows of a journal in order, of the given kinds or all; raises BadInput when it cannot be read."""
-    if not path.is_file():
-        raise BadInput(f"{path}: there is no journal here; give the folder of a run")
+def read_meta(path: Path, key: str) -> Any:
+    """A value that a journal was given with `set_meta`; raises BadInput when there is no such journal or value."""
+    database = _open_to_read(path)
     try:
-        database = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
-        try:
-            where = f"WHERE kind IN ({', '.join('?' * len(kinds))})" if kinds else ""
-            query = f"SELECT seq, time, kind, key, body FROM events {where} ORDER BY seq"
-            for seq, time, kind, key, body in database.execute(query, kinds):
-                yield Row(seq, time, kind, key, json.loads(body))
-        finally:
-            database.close()
+        row = database.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
     except sqlite3.Error as error:
         raise BadInput(f"{path}: the journal cannot be read ({error})") from error
+    finally:
+        database.close()
+    if row is None:
+        raise BadInput(f"{path}: the journal has no {key}; it is not one of a started run")
+    return json.loads(row[0])
+
+
+def _open_to_read(path: Path) -> sqlite3.Connection:
+    if not path.is_file():
+        raise BadInput(f"{path}: there is no journal here; give the folder of a run")
+    return sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+
+
+def read_rows(path: Path, *kinds: str) -> Iterator[Row]:
+    """The rows of a journal in order, of the given kinds or all; raises BadInput when it cannot be read."""
+    database = _open_to_read(path)
+    try:
+        where = f"WHERE kind IN ({', '.join('?' * len(kinds))})" if kinds else ""
+        query = f"SELECT seq, time, kind, key, body FROM events {where} ORDER BY seq"
+        for seq, time, kind, key, body in database.execute(query, kinds):
+            yield Row(seq, time, kind, key, json.loads(body))
+    except sqlite3.Error as error:
+        raise BadInput(f"{path}: the journal cannot be read ({error})") from error
+    finally:
+        database.close()

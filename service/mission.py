@@ -14,7 +14,7 @@ import logging
 import math
 import sqlite3
 import time
-from collections.abc import Awaitable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -77,10 +77,13 @@ class Mission:
         journal: Journal,
         intake: Intake,
         may_take_off: bool,
+        sent: Callable[[float], None] = lambda seconds: None,
     ) -> None:
+        """`sent` is told the seconds from a hit's report to its waypoint on the wire."""
         self.settings, self.clock, self.search = settings, clock, search
         self.vehicle, self.journal, self.intake = vehicle, journal, intake
         self.may_take_off = may_take_off
+        self._sent = sent
         self.frame = search.grid.frame
         self.state = State.WAITING
         self.flight = Flight()
@@ -182,7 +185,9 @@ class Mission:
                     watcher.cancel()
 
     async def _get_ready(self) -> None:
-        await self.vehicle.connect(self.settings.link.connect_timeout_s)
+        patience = self.settings.link.connect_timeout_s
+        await self.vehicle.connect(patience)
+        await self.vehicle.wait_until(lambda t: t.landed_state != "undefined", patience)
         self._altitude_m = self.vehicle.telemetry.home_alt_amsl_m + self.settings.flight.altitude_m
         await self.happen(Event.LINKED, f"{self.vehicle.telemetry.autopilot} is ready")
         if self.may_take_off and self._on_ground():
@@ -240,7 +245,7 @@ class Mission:
     async def _look_for_the_end(self) -> None:
         """Found, searched enough, too little energy, or nobody looking?"""
         settings, place = self.settings, self.search.place
-        if place.probability >= settings.search.found_at:
+        if place.probability >= settings.search.found_at and self.search.was_hit(place):
             self.found = self._locate_target(place)
             await self._write("found", vars(self.found))
             lat, lon = self.found.lat, self.found.lon
@@ -323,6 +328,7 @@ class Mission:
             await self._send(self._latlon(target))
             if self._hit_at is not None:
                 self.flight.latencies_s.append(time.perf_counter() - self._hit_at)
+                self._sent(self.flight.latencies_s[-1])
                 self._hit_at = None
 
     def observed(self, observation: Observation, arrived: float) -> None:

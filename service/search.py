@@ -55,6 +55,7 @@ class Search:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
         self._rng = np.random.default_rng(settings.run.seed)
         self._place: Place | None = None
+        self._hits: set[Cell] = set()
 
     def warm_up(self, progress: Callable[[str, int, int], None] | None = None) -> None:
         """Compile what the planner needs; `progress(name, done, total)` is told."""
@@ -64,7 +65,13 @@ class Search:
         """Update the belief, exactly, and the record of looks."""
         self.belief.observe(observation.cells, observation.hits, observation.p_tp, observation.p_tn)
         self.record.look(observation.cells[observation.first], observation.p_tp[observation.first])
+        self._hits.update((row, col) for row, col in observation.cells[observation.hits].tolist())
         self._place = None
+
+    def was_hit(self, place: Place) -> bool:
+        """True when a detection was ever reported at `place` or beside it: a sharp prior alone finds nobody."""
+        row, col = place.cell
+        return any((row + r, col + c) in self._hits for r in (-1, 0, 1) for c in (-1, 0, 1))
 
     @property
     def place(self) -> Place:
@@ -89,7 +96,7 @@ class Search:
         """The decision in words: where to, how much is there, how far, and what else was weighed."""
         ranked = sorted(decision.alternatives, key=lambda option: -option.visits)
         options = tuple((option.action, option.visits, option.value) for option in ranked)
-        goal = decision.path[-1] if decision.path else cell
+        goal = decision.goal or decision.path[-1]
         label = int(self.regions.labels[goal])
         distance = self.distance(cell, goal)
         if label:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from roisearch.kernels.compiled import kernel
 from roisearch.kernels.goals import set_goals
-from roisearch.kernels.ground import cell_step
+from roisearch.kernels.ground import col_step, row_step
 from roisearch.kernels.puct import search
 from roisearch.kernels.records import (
     N_A,
@@ -148,7 +148,8 @@ def decide(
     nodes = search(nodes, iterations, row, col, heading, tree, land, mass, sight, aims, rules, state)
     action = choose(tree, choose_by, held, margin, shown)
     if action < 4:
-        path[0] = cell + cell_step(action, cols)
+        path[0, 0] = row + row_step(action)
+        path[1, 0] = col + col_step(action)
         return nodes, action, 1
     now = Mass(weights, fade, False, log)
     return nodes, action, walk_trip(row, col, heading, action - 4, land, now, sight, aims, path)

@@ -10,17 +10,17 @@ obstacles it is a breadth-first search from the sources, kept in `Aims.fields`.
 
 from __future__ import annotations
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.records import FAR, Aims, Bits, Ints, Land, Sight, Steps
 
 
-@kernel
+@inlined
 def row_step(move: int) -> int:
     """Rows down by a move."""
     return move - 1 if move & 1 == 0 else 0
 
 
-@kernel
+@inlined
 def col_step(move: int) -> int:
     """Columns to the right by a move."""
     return 2 - move if move & 1 == 1 else 0

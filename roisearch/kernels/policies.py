@@ -68,10 +68,12 @@ def search_policies(
             total += gain
             if fades:
                 logged = fade_at(row, col, facing, land.rows, cols, mass, sight, logged)
-            trial[step] = row * cols + col
+            trial[0, step] = row
+            trial[1, step] = col
         restore(mass, logged)
         if total > best:
             best = total
             for step in range(horizon):
-                path[step] = trial[step]
+                path[0, step] = trial[0, step]
+                path[1, step] = trial[1, step]
     return best

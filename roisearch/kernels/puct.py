@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.ground import col_step, row_step, steps_to
 from roisearch.kernels.records import (
     DENSITY,
@@ -72,7 +72,7 @@ def hope_of_option(
     return density(row, col, region, aims, rules)
 
 
-@kernel
+@inlined
 def expand(
     node: int, row: int, col: int, tree: Tree, land: Land, mass: Mass, sight: Sight, aims: Aims, rules: Rules
 ) -> None:
@@ -120,7 +120,7 @@ def expand(
     tree.visits[node] = 0.0
 
 
-@kernel
+@inlined
 def select(node: int, tree: Tree, rules: Rules) -> int:
     """The action with the best PUCT score, Q + c P sqrt(N + 1) / (1 + n).
 
@@ -161,7 +161,7 @@ def jump(row: int, col: int, heading: int, region: int, land: Land, aims: Aims) 
     return to_row, to_col, heading
 
 
-@kernel
+@inlined
 def descend(
     nodes: int,
     row: int,
@@ -224,7 +224,7 @@ def descend(
     return nodes, tree.trail.shape[0], row, col, heading, logged
 
 
-@kernel
+@inlined
 def ascend(depth: int, value: float, tree: Tree, rules: Rules) -> None:
     """Carry the return of the rollout back up the trail."""
     for step in range(depth - 1, -1, -1):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.records import Mass, Sight
 
 
-@kernel
+@inlined
 def gain_at(row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, sight: Sight) -> float:
     """The weight in the field of view, each cell times its gain."""
     if sight.is_point:

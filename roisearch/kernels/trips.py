@@ -48,16 +48,17 @@ def walk_trip(
     aims: Aims,
     path: Ints,
 ) -> int:
-    """Write the cells of the trip to the goal of `region` into `path`, as many as fit; how many there are."""
+    """Write rows and columns of the trip to the goal of `region` into `path` [2, n]; how many fitted."""
     length = 0
     arrived = False
-    while not arrived and length < path.size:
+    while not arrived and length < path.shape[1]:
         move, arrived = trip_move(row, col, heading, region, land, mass, sight, aims)
         if move < 0:
             break
         row += row_step(move)
         col += col_step(move)
         heading = move
-        path[length] = row * land.cols + col
+        path[0, length] = row
+        path[1, length] = col
         length += 1
     return length

@@ -133,9 +133,11 @@ class World:
         return Scene(ground, part, Forest(labels, regions.count + 2), centroids)
 
 
-def cells_of(path: NDArray[np.int64], cols: int) -> tuple[Cell, ...]:
-    """Flat indices as (row, col) pairs of plain ints."""
-    return tuple([divmod(cell, cols) for cell in path.tolist()])
+def cells_of(path: NDArray[np.int64], length: int) -> tuple[Cell, ...]:
+    """The first `length` cells of rows and columns [2, n], as pairs of plain ints."""
+    if length == 1:
+        return ((int(path[0, 0]), int(path[1, 0])),)
+    return tuple(zip(*path[:, :length].tolist(), strict=False))  # strict costs a microsecond
 
 
 def remark_on(unreachable: float) -> str:

@@ -45,7 +45,7 @@ class GreedyPlanner:
         self._horizon = horizon
         self._window = np.zeros((2 * horizon + 1, 2 * horizon + 1), dtype=np.int32)
         self._queue = np.zeros(2 * self._window.size, dtype=np.int64)
-        self._path = np.zeros(horizon, dtype=np.int64)
+        self._path = np.zeros((2, horizon), dtype=np.int64)
         self._gains = np.ones(len(fov.p_tp))
 
     def plan(
@@ -69,9 +69,9 @@ class GreedyPlanner:
         if length == 0:
             return any_move(scene, state, began, unreachable)
         effort = Effort(0, time.perf_counter() - began)
-        path = cells_of(self._path[:length], cols)
+        path = cells_of(self._path, length)
         return Decision(path, "horizon", value / belief.total, effort, unreachable, remark_on(unreachable))
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use, by making some on a small map."""
-        warm_up(GreedyPlanner(fov=self._fov), self._fov, progress)
+        warm_up(lambda ground: GreedyPlanner(fov=self._fov, flyable=ground), self._fov, progress)

@@ -11,7 +11,7 @@ from roisearch.belief import Belief
 from roisearch.decision import Decision, Effort, SearchState
 from roisearch.fov import FieldOfView
 from roisearch.kernels.ground import cell_step, flood
-from roisearch.planners.base import Progress, Scene, World, any_move, cells_of, remark_on
+from roisearch.planners.base import Progress, Scene, World, any_move, remark_on
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions
 
@@ -95,7 +95,7 @@ class PatternPlanner:
             return any_move(scene, state, began, unreachable)
         value = float(belief.weights[goal]) / belief.total
         effort = Effort(0, time.perf_counter() - began)
-        cells = cells_of(np.array(path, dtype=np.int64), cols)
+        cells = tuple(divmod(cell, cols) for cell in path)
         return Decision(cells, action, value, effort, unreachable, remark_on(unreachable))
 
     def _way(self, scene: Scene, at: int, goal: int, cols: int) -> list[int]:
@@ -136,7 +136,7 @@ class PatternPlanner:
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use, by making some on a small map."""
-        warm_up(type(self)(fov=self._fov), self._fov, progress)
+        warm_up(lambda ground: type(self)(fov=self._fov, flyable=ground), self._fov, progress)
 
 
 class CoveragePlanner(PatternPlanner):

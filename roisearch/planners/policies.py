@@ -57,7 +57,7 @@ class DirectPolicySearch:
         self._random = np.zeros(1, dtype=np.uint64)
         self._log = np.zeros(horizon * len(fov.p_tp), dtype=np.int64)
         self._gains, self._miss = np.ones(len(fov.p_tp)), 1.0 - fov.p_tp
-        self._trial, self._path, self._best = (np.zeros(horizon, dtype=np.int64) for _ in range(3))
+        self._trial, self._path, self._best = (np.zeros((2, horizon), dtype=np.int64) for _ in range(3))
 
     def plan(
         self,
@@ -90,11 +90,11 @@ class DirectPolicySearch:
                 self._best[:] = self._path
             if deadline_s is not None and time.perf_counter() - began >= deadline_s:
                 break
-        path = cells_of(self._best, cols)
+        path = cells_of(self._best, self._horizon)
         unreachable = scene.unreachable(belief, belief.sums_of(scene.forest))
         effort = Effort(done, time.perf_counter() - began)
         return Decision(path, "walk", best / belief.total, effort, unreachable, remark_on(unreachable))
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use, by making some on a small map."""
-        warm_up(DirectPolicySearch(fov=self._fov), self._fov, progress)
+        warm_up(lambda ground: DirectPolicySearch(fov=self._fov, flyable=ground), self._fov, progress)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import random
 from typing import Any, ClassVar
 
 from sim.autopilot.behaviours import (
@@ -16,7 +17,7 @@ from sim.autopilot.behaviours import (
     Stand,
     TakeOff,
 )
-from sim.autopilot.commands import ACCEPTED, DENIED, FAILED, UNSUPPORTED, Command, Result, Results
+from sim.autopilot.commands import ACCEPTED, DENIED, FAILED, UNSUPPORTED, Command, Result, Results, whole
 from sim.autopilot.dialect import M
 from sim.autopilot.firmware import CRITICAL, FORCE, INFO, WARNING, Firmware
 from sim.autopilot.motion import Limits
@@ -50,6 +51,7 @@ _NEED_POSITION = ("AUTO", "GUIDED", "LOITER", "RTL", "CIRCLE", "POSHOLD", "BRAKE
 _ABSOLUTE = (M.MAV_FRAME_GLOBAL, M.MAV_FRAME_GLOBAL_INT)
 _RELATIVE = (M.MAV_FRAME_GLOBAL_RELATIVE_ALT, M.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _VELOCITY_TIMEOUT_S = 3.0
+_EARLY = (0.40, 0.55)  # of the time from boot to ready: the pre-arm bit reads healthy too early
 
 
 class ArduCopter(Firmware):
@@ -84,6 +86,7 @@ class ArduCopter(Firmware):
     upload_retry_s, upload_timeout_s = 1.0, 8.0
     parameters_as_bits, tells_index_by_name, echoes_when_changed = False, False, 1
     serves_data_streams = True
+    reboot_refusal, pilot_mode = FAILED, "LOITER"
     target_fields = (M.MAV_FRAME_GLOBAL, 65016, False)
     cells = 3
     vtol_state = M.MAV_VTOL_STATE_MC
@@ -92,6 +95,7 @@ class ArduCopter(Firmware):
     home_share = 0.8
 
     def boot(self) -> None:
+        self._too_early = random.Random(self.settings.seed).random() < 2 / 3
         self._told: dict[str, bool] = {}
         self._low_said = 0
         self._breached = False
@@ -108,6 +112,9 @@ class ArduCopter(Firmware):
             (4.0, "EKF3 IMU0 tilt alignment complete"),
             (6.0, "GPS 1: detected u-blox"),
         ]
+        if self._too_early:
+            when = (_EARLY[1] + 0.05) * self.settings.ready_after_s
+            self._boot_texts.append((max(when, 6.0), "PreArm: Need Position Estimate"))
 
     def kind_after_set(self, kind: int) -> int:
         return REAL32
@@ -120,6 +127,12 @@ class ArduCopter(Firmware):
 
     def obeys(self, system: int, component: int) -> bool:
         return (system, component) != (self.settings.sysid, 1)
+
+    @property
+    def prearm_healthy(self) -> bool:
+        """The bit reads healthy for a moment long before there is a position, as in two boots of three."""
+        share = self.vehicle.time / max(self.settings.ready_after_s, 1e-9)
+        return self.ready or (self._too_early and _EARLY[0] <= share < _EARLY[1])
 
     def system_status(self) -> int:
         if self.vehicle.time < 1.5:
@@ -158,9 +171,9 @@ class ArduCopter(Firmware):
         return Return(home, height, wait_s=5.0, land=land, say=lambda text: None)
 
     def on_set_mode(self, command: Command) -> Results:
-        if not int(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        if not whole(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return DENIED
-        return ACCEPTED if self._enter(int(command.param2)) else FAILED
+        return ACCEPTED if self._enter(whole(command.param2)) else FAILED
 
     def on_set_mode_message(self, custom_mode: int) -> Results:
         self._enter(custom_mode)
@@ -219,7 +232,7 @@ class ArduCopter(Firmware):
 
     def on_takeoff(self, command: Command) -> Results:
         vehicle = self.vehicle
-        if not vehicle.armed or self.mode != "GUIDED" or vehicle.flying or not command.z > 0:
+        if not vehicle.armed or self.mode != "GUIDED" or vehicle.flying or not 0 < command.z < math.inf:
             return FAILED
         if not vehicle.stuck:
             vehicle.behaviour = self._climb_to(self.home_or_here().up + command.z)
@@ -238,7 +251,7 @@ class ArduCopter(Firmware):
             return DENIED
         if not self._is_place(command) or not math.isfinite(command.z):
             return DENIED
-        flags = 0 if math.isnan(command.param2) else int(command.param2)
+        flags = whole(command.param2)
         if self.mode != "GUIDED" and (not flags & 1 or not self.position_known):
             return DENIED
         north, east = vehicle.frame.from_e7(command.x, command.y)
@@ -262,7 +275,7 @@ class ArduCopter(Firmware):
     def on_change_speed(self, command: Command) -> Results:
         if not command.param2 > 0:
             return DENIED
-        self.vehicle.speed_limit = command.param2
+        self.vehicle.speed_limit = min(command.param2, 20.0)
         return ACCEPTED
 
     def on_fence_enable(self, command: Command) -> Results:
@@ -333,7 +346,8 @@ class ArduCopter(Firmware):
     def watch(self) -> None:
         vehicle, time = self.vehicle, self.vehicle.time
         while self._boot_texts and time >= self._boot_texts[0][0]:
-            vehicle.say(INFO, self._boot_texts.pop(0)[1])
+            text = self._boot_texts.pop(0)[1]
+            vehicle.say(CRITICAL if text.startswith("PreArm") else INFO, text)
         behaviour = vehicle.behaviour
         if isinstance(behaviour, TakeOff) and behaviour.done and self.mode == "GUIDED":
             vehicle.behaviour = GoTo(behaviour.target)
@@ -378,8 +392,11 @@ class ArduCopter(Firmware):
         seen = self.vehicle.seen
         outside = self.vehicle.flying and self._fence_on and self.breaches_fence(seen.north, seen.east)
         if outside and not self._breached:
-            self.vehicle.say(WARNING, "Polygon fence breached")
-            if int(self.parameters["FENCE_ACTION"]) == 1:
-                self.set_mode("RTL")
-                self.failsafe = True
+            self.on_breach(False)
         self._breached = outside
+
+    def on_breach(self, forced: bool) -> None:
+        self.vehicle.say(WARNING, "Polygon fence breached")
+        if forced or int(self.parameters["FENCE_ACTION"]) == 1:
+            self.set_mode("RTL")
+            self.failsafe = True

@@ -75,7 +75,8 @@ class GoTo(Behaviour):
         if self._yaw is not None:
             demand.yaw = self._yaw
             return
-        if math.hypot(gap_north, gap_east) > 2.0:
+        gap = math.hypot(gap_north, gap_east)
+        if gap > 6.0 or (self._facing is None and gap > 1.0):
             self._facing = bearing(gap_north, gap_east)
         demand.yaw = self._facing
 

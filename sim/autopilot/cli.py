@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import os
 import signal
 import sys
+import time
 from collections.abc import Callable
+from pathlib import Path
 
+from sim.autopilot import control
 from sim.autopilot.address import Address
 from sim.autopilot.core import FIRMWARES, Autopilot
+from sim.autopilot.faults import Fault, read_faults
 from sim.autopilot.settings import Settings
 from sim.autopilot.transport import Driver, Mock
 
@@ -34,6 +39,13 @@ def _address(text: str) -> Address:
         return Address.parse(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _host_port(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if host not in ("127.0.0.1", "localhost") or not port.isdecimal() or int(port) > 65535:
+        raise argparse.ArgumentTypeError(f"'{text}' should be 127.0.0.1:PORT")
+    return host, int(port)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -62,6 +74,10 @@ def parser() -> argparse.ArgumentParser:
         "--wind", type=_numbers(2), default=(0.0, 0.0), metavar="NORTH,EAST", help="m/s of the air"
     )
     p.add_argument("--gust", type=float, default=0.0, help="m/s, standard deviation of the gusts")
+    p.add_argument("--epoch", type=float, help="time of day at boot, seconds since 1970; default now")
+    p.add_argument("--attached", action="store_true", help="end when standard input closes")
+    p.add_argument("--faults", type=Path, metavar="FILE", help="TOML file of faults")
+    p.add_argument("--control", type=_host_port, metavar="HOST:PORT", help="control socket (loopback only)")
     return p
 
 
@@ -78,15 +94,40 @@ def settings_of(args: argparse.Namespace) -> Settings:
         endurance_s=args.endurance * 60.0,
         wind_mps=args.wind,
         gust_mps=args.gust,
+        epoch_s=time.time() if args.epoch is None else args.epoch,
     )
 
 
-async def _serve(settings: Settings, listen: list[Address]) -> int:
+def _stop_with_standard_input(stop: asyncio.Event) -> None:
+    """Set `stop` when whoever started us is gone, however it went."""
+    loop, pipe = asyncio.get_running_loop(), sys.stdin.fileno()
+
+    def read() -> None:
+        if not os.read(pipe, 4096):
+            loop.remove_reader(pipe)
+            stop.set()
+
+    loop.add_reader(pipe, read)
+
+
+async def _serve(
+    settings: Settings,
+    listen: list[Address],
+    faults: list[Fault],
+    control_at: tuple[str, int] | None,
+    attached: bool,
+) -> int:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
+    if attached:
+        _stop_with_standard_input(stop)
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
     mock = Mock(Autopilot(settings))
+    for fault in faults:
+        mock.autopilot.faults.add(fault)
+    driver = Driver([mock], settings.speedup)
+    server: asyncio.Server | None = None
     try:
         for address in listen:
             try:
@@ -97,11 +138,17 @@ async def _serve(settings: Settings, listen: list[Address]) -> int:
                 )
                 return 2
             print(f"listening on {bound}", flush=True)
+        if control_at is not None:
+            server = await control.serve(mock.autopilot, *control_at, driver.set_speedup, mock.flush)
+            host, port = server.sockets[0].getsockname()[:2]
+            print(f"control on tcp://{host}:{port}", flush=True)
         async with asyncio.TaskGroup() as group:
-            driver = group.create_task(Driver([mock], settings.speedup).run())
+            running = group.create_task(driver.run())
             await stop.wait()
-            driver.cancel()
+            running.cancel()
     finally:
+        if server is not None:
+            server.close()
         mock.close()
     return 0
 
@@ -114,5 +161,10 @@ def main(arguments: list[str]) -> int:
         p.error("--speedup is from 0.01 to 100")
     if not 1 <= args.sysid <= 255:
         p.error("--sysid is from 1 to 255")
+    try:
+        faults = [] if args.faults is None else read_faults(args.faults)
+    except ValueError as error:
+        print(f"roisearch-sim autopilot: {error}", file=sys.stderr)
+        return 2
     listen = args.listen or [Address("udpin", "127.0.0.1", 14540)]
-    return asyncio.run(_serve(settings_of(args), listen))
+    return asyncio.run(_serve(settings_of(args), listen, faults, args.control, args.attached))

@@ -29,6 +29,11 @@ UNSUPPORTED: Results = (Result.UNSUPPORTED,)
 FAILED: Results = (Result.FAILED,)
 
 
+def whole(value: float) -> int:
+    """A parameter that means a whole number; 0 where it is none."""
+    return int(value) if math.isfinite(value) else 0
+
+
 @dataclass(frozen=True, slots=True)
 class Command:
     """One command. `frame` is None when it came as COMMAND_LONG, whose place is in degrees."""
@@ -58,5 +63,6 @@ class Command:
     def place_e7(self) -> tuple[float, float] | None:
         """Latitude and longitude in 1e-7 degrees; None when it says "here" (NaN, or INT32_MAX)."""
         if self.frame is None:
-            return None if math.isnan(self.x) or math.isnan(self.y) else (self.x * 1e7, self.y * 1e7)
+            is_place = math.isfinite(self.x) and math.isfinite(self.y)
+            return (self.x * 1e7, self.y * 1e7) if is_place else None
         return None if self.x == INT32_MAX or self.y == INT32_MAX else (self.x, self.y)

@@ -6,12 +6,14 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 from typing import Any
 
 from sim.autopilot.ardupilot import ArduCopter
 from sim.autopilot.commands import Command
 from sim.autopilot.dialect import M
+from sim.autopilot.faults import Faults
 from sim.autopilot.firmware import Firmware
 from sim.autopilot.link import Link
 from sim.autopilot.missions import Missions
@@ -21,10 +23,12 @@ from sim.autopilot.requests import Requests
 from sim.autopilot.setpoints import Setpoints
 from sim.autopilot.settings import STEP_S, Settings
 from sim.autopilot.telemetry import BUILDERS, heartbeat
+from sim.autopilot.trouble import Trouble
 
 FIRMWARES: dict[str, type[Firmware]] = {"px4": Px4, "ardupilot": ArduCopter}
 
 _TICK_STEPS = round(0.1 / STEP_S)
+_REBOOT_STEPS = round(2.0 / STEP_S)  # a booting autopilot says nothing for so long
 _STEP_US = round(STEP_S * 1e6)
 _CHUNK = 50  # characters of one STATUSTEXT
 _HEARTBEAT = M.MAVLINK_MSG_ID_HEARTBEAT
@@ -37,15 +41,17 @@ class Autopilot:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        self.firmware = FIRMWARES[settings.flavor](settings)
-        self.vehicle = self.firmware.vehicle
+        self.steps = 0  # since the first boot; `vehicle.steps` starts again at each
+        self.trouble, self.chance = Trouble(), random.Random(settings.seed + 1)
+        self.frozen = False  # a fault: only the heart still beats
+        self._boot()
+        self.faults = Faults(self)
         self.links: list[Link] = []
         self.carriers: list[Any] = []  # the transport's; the core does not look inside
         self.missions = Missions(self)
         self.requests = Requests(self)
         self._text_id = 0
-        self._reached = -1
-        self._home_sent = False
+        self._silent_until = 0
         self._handlers: dict[int, Handler] = {
             M.MAVLINK_MSG_ID_COMMAND_LONG: self._on_command,
             M.MAVLINK_MSG_ID_COMMAND_INT: self._on_command,
@@ -58,8 +64,27 @@ class Autopilot:
             **ParameterProtocol(self).handlers,
             **Setpoints(self).handlers,
         }
+
+    def _boot(self) -> None:
+        self.firmware = FIRMWARES[self.settings.flavor](self.settings)
+        self.vehicle = self.firmware.vehicle
+        self._home_sent, self._reached = False, -1
         if self.firmware.heartbeat_on_mode_change:
             self.firmware.mode_changed = lambda: self.broadcast(heartbeat(self))
+
+    def reboot(self) -> None:
+        """Start again, as after a brown-out: the motors stop, the body and the stored things stay."""
+        old = self.firmware
+        self._boot()
+        self.firmware.keep(old)
+        self._silent_until = self.steps + _REBOOT_STEPS
+        for link in self.links:
+            link.reset()
+
+    @property
+    def clock(self) -> float:
+        """Seconds since the first boot."""
+        return self.steps * STEP_S
 
     # ---- what the telemetry builders read
     @property
@@ -80,21 +105,40 @@ class Autopilot:
 
     def receive(self, link: Link, data: bytes) -> None:
         """Take bytes that came on a link."""
-        for message in link.parse(data):
+        if link.shaky:
+            link.into.put(data, self.clock)
+        else:
+            self.take(link, data)
+
+    def take(self, link: Link, data: bytes) -> None:
+        """Obey bytes that have made it through the radio."""
+        messages = link.parse(data)
+        if self.frozen or self.steps < self._silent_until:
+            return
+        for message in messages:
             self._dispatch(link, message)
         self._flush_texts()
 
     def advance(self, steps: int = 1) -> None:
         """Move vehicle time on by some steps."""
-        vehicle = self.vehicle
         for _ in range(steps):
+            self.steps += 1
+            vehicle = self.vehicle
             vehicle.step()
-            count = vehicle.steps
-            if count % _TICK_STEPS == 0:
-                self._tick()
-            now = count * _STEP_US
+            if self.steps % _TICK_STEPS == 0:
+                self.faults.tick()
+                for link in self.links:
+                    link.shake()
+                if not self.frozen and self.steps >= self._silent_until:
+                    self._tick()
+            if self.steps < self._silent_until:
+                continue
+            now = self.vehicle.steps * _STEP_US
             for link in self.links:
-                link.stream(now)
+                if self.frozen:
+                    link.beat(now)
+                else:
+                    link.stream(now)
 
     def broadcast(self, message: Any) -> None:
         """Send a message on every link."""

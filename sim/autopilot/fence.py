@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from sim.autopilot.commands import whole
 from sim.autopilot.dialect import M
 
 _POLYGONS = {
@@ -38,7 +39,7 @@ class Fence:
         while k < len(items):
             item = items[k]
             if item.command in _POLYGONS:
-                count = max(int(item.param1), 1)
+                count = max(whole(item.param1), 1)
                 corners = [(float(each.x), float(each.y)) for each in items[k : k + count]]
                 self._polygons.append((_POLYGONS[item.command], corners))
                 k += count

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from sim.autopilot.behaviours import Behaviour, GoTo, Hold, Stand
-from sim.autopilot.commands import ACCEPTED, UNSUPPORTED, Command, Results
+from sim.autopilot.commands import ACCEPTED, UNSUPPORTED, Command, Results, whole
 from sim.autopilot.dialect import M
 from sim.autopilot.fence import Fence
 from sim.autopilot.motion import Limits
@@ -24,6 +24,14 @@ from sim.autopilot.vehicle import Landed, Point, Vehicle
 FORCE = 21196.0  # param2 of COMPONENT_ARM_DISARM: do it whatever the checks say
 INFO, WARNING, CRITICAL, EMERGENCY = 6, 4, 2, 0  # MAV_SEVERITY
 GPS_TIMEOUT_S = 3.0  # without GPS the estimate is worth nothing after this long
+
+
+def link_floor_s(speedup: float) -> float:
+    """Vehicle time in which a lost link may not be called lost yet: 0.1 s of wall time.
+
+    The talk of others comes at the pace of the wall clock; the real simulators stretch these time-outs too.
+    """
+    return 0.1 * speedup
 
 
 class Firmware(ABC):
@@ -54,6 +62,8 @@ class Firmware(ABC):
     tells_index_by_name: ClassVar[bool]  # param_index of an answer to a read by name
     echoes_when_changed: ClassVar[int]  # PARAM_VALUE messages after a PARAM_SET that changed the value
     serves_data_streams: ClassVar[bool]  # REQUEST_DATA_STREAM
+    reboot_refusal: ClassVar[Results]  # while armed
+    pilot_mode: ClassVar[str]  # the mode a pilot takes over with
     target_fields: ClassVar[tuple[int, int, bool]]  # POSITION_TARGET: frame, type mask, silent on the ground
     cells: ClassVar[int]  # battery
     position_error_m: ClassVar[float]
@@ -75,7 +85,7 @@ class Firmware(ABC):
         self.vehicle.behaviour = Stand()
         self.mode = self.boot_mode
         self.failsafe = False
-        self.link_floor_s = 0.1 * settings.speedup  # link losses are judged no faster than 0.1 s of wall time
+        self.link_floor_s = link_floor_s(settings.speedup)
         self.parameters = ParameterStore(self.parameter_table())
         self.plan, self.fence = Plan(), Fence()
         self.ready = False
@@ -164,6 +174,14 @@ class Firmware(ABC):
     def boot(self) -> None:
         """Start from nothing: the flavour's own state."""
 
+    def keep(self, old: Firmware) -> None:
+        """Take over from before a reboot what a reboot does not change: the world and the stored things."""
+        vehicle, before = self.vehicle, old.vehicle
+        vehicle.body, vehicle.battery, vehicle.gps = before.body, before.battery, before.gps
+        vehicle.wind, vehicle.air, vehicle.estimator = before.wind, before.air, before.estimator
+        self.parameters, self.plan, self.fence = old.parameters, old.plan, old.fence
+        self.link_floor_s = old.link_floor_s
+
     def stored_items(self, items: list[Any]) -> list[Any]:
         """How uploaded mission items are kept."""
         return items
@@ -241,12 +259,36 @@ class Firmware(ABC):
         if command.param1 == 1.0 or place is None:
             vehicle.home = vehicle.seen
         else:
-            vehicle.home = Point(*vehicle.frame.from_e7(*place), command.z - vehicle.ground_amsl)
+            vehicle.home = Point(*vehicle.frame.from_e7(*place), self.up_of_amsl(command.z))
         return ACCEPTED
+
+    def pilot(self, mode: str) -> None:
+        """The pilot selects a mode."""
+        self.failsafe = False
+        self.set_mode(mode)
+
+    def fail_to(self, mode: str, text: str) -> None:
+        """A failsafe of its own: say so and change the mode."""
+        self.vehicle.say(CRITICAL, text)
+        self.set_mode(mode)
+        self.failsafe = True
+
+    def on_reboot(self, command: Command) -> Results:
+        """PREFLIGHT_REBOOT_SHUTDOWN: only while disarmed."""
+        return self.reboot_refusal if self.vehicle.armed else ACCEPTED
+
+    @abstractmethod
+    def on_breach(self, forced: bool) -> None:
+        """It has left the fence; `forced`: come home whatever the parameters say."""
 
     def on_set_current(self, command: Command) -> Results:
         """DO_SET_MISSION_CURRENT."""
-        return ACCEPTED if self.plan.select(int(command.param1)) else UNSUPPORTED
+        return ACCEPTED if self.plan.select(whole(command.param1)) else UNSUPPORTED
+
+    @property
+    def prearm_healthy(self) -> bool:
+        """The pre-arm bit of SYS_STATUS."""
+        return self.ready
 
     @property
     def position_known(self) -> bool:
@@ -291,6 +333,9 @@ class Firmware(ABC):
                 self.gps_lost_at = time
         else:
             self.gps_lost_at = None
+        if vehicle.battery.charge <= 0.0 and vehicle.flying:
+            vehicle.say(EMERGENCY, "Battery is empty")
+            self.disarm("Motors stopped", landed=False)
         self.ready = time >= self.settings.ready_after_s and self.position_known
         if vehicle.armed:
             self._watch_landing(time)
@@ -329,7 +374,7 @@ class Firmware(ABC):
 
     def up_of_amsl(self, altitude: float) -> float:
         """Height in the home frame of an altitude above mean sea level; NaN keeps the present height."""
-        if math.isnan(altitude):
+        if not math.isfinite(altitude):
             return self.target_or_seen().up
         return altitude - self.vehicle.ground_amsl
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from sim.autopilot.dialect import M
 from sim.autopilot.telemetry import BUILDERS
+from sim.autopilot.trouble import Radio, is_ack
 
 if TYPE_CHECKING:
     from sim.autopilot.core import Autopilot
@@ -31,21 +32,45 @@ class Link:
         self._codec = M.MAVLink(None, srcSystem=autopilot.settings.sysid, srcComponent=1)
         self._codec.robust_parsing = True
         self.outbox: list[bytes] = []
+        self.out = Radio(autopilot.trouble, autopilot.chance, self.outbox_append)
+        self.into = Radio(autopilot.trouble, autopilot.chance, lambda data: autopilot.take(self, data))
+        self.shaky = False  # goes through the radios
         self._streams: dict[int, _Stream] = {}
         self._due = _NEVER
+        self.reset()
+
+    def reset(self) -> None:
+        """The rates of a vehicle that has just booted."""
+        self._streams.clear()
         self.set_interval(_HEARTBEAT, 1_000_000)
-        for number, rate in autopilot.firmware.default_streams_hz.items():
+        for number, rate in self._autopilot.firmware.default_streams_hz.items():
             self.set_interval(number, round(1e6 / rate))
 
     # ---- sending
+    def outbox_append(self, frame: bytes) -> None:
+        """Let one frame through."""
+        self.outbox.append(frame)
+
     def send(self, message: Any) -> None:
         """Put one message in the outbox."""
-        self.outbox.append(message.pack(self._codec))
+        self._post(message.pack(self._codec))
 
     def send_as(self, message: Any, system: int, component: int) -> None:
         """Put a message of somebody else on the same wire in the outbox."""
-        other = M.MAVLink(None, srcSystem=system, srcComponent=component)
-        self.outbox.append(message.pack(other))
+        self._post(message.pack(M.MAVLink(None, srcSystem=system, srcComponent=component)))
+
+    def _post(self, frame: bytes) -> None:
+        if not self.shaky:
+            self.outbox.append(frame)
+        elif not (self._autopilot.trouble.acks_lost and is_ack(frame)):
+            self.out.put(frame, self._autopilot.clock)
+
+    def shake(self) -> None:
+        """Deliver what the radios have held back, and use them while there is trouble."""
+        now = self._autopilot.clock
+        self.out.release(now)
+        self.into.release(now)
+        self.shaky = self._autopilot.trouble.any or self.out.busy or self.into.busy
 
     def interval_us(self, number: int) -> int:
         """Interval of a message in microseconds, -1 when it is off."""
@@ -65,6 +90,13 @@ class Link:
             now = self._autopilot.vehicle.steps * 20_000
             self._streams[number] = _Stream(number, max(interval_us, 20_000), now)
             self._due = min(self._due, now)
+
+    def beat(self, now_us: int) -> None:
+        """Send the heartbeat when it is due, and nothing else."""
+        stream = self._streams.get(_HEARTBEAT)
+        if stream is not None and stream.due <= now_us:
+            self.send(stream.builder(self._autopilot))
+            stream.due = now_us + stream.interval_us
 
     def stream(self, now_us: int) -> None:
         """Send what is due."""

@@ -48,6 +48,7 @@ class Missions:
             M.MAVLINK_MSG_ID_MISSION_REQUEST: self._on_request,
             M.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._on_clear,
             M.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._on_set_current,
+            M.MAVLINK_MSG_ID_MISSION_ACK: self._on_ack,
         }
 
     def _ack(self, link: Link, to: Any, result: int, kind: int) -> None:
@@ -157,6 +158,17 @@ class Missions:
     def _on_set_current(self, link: Link, message: Any) -> None:
         self._autopilot.firmware.plan.select(message.seq)
         self._autopilot.announce_current()
+
+    def _on_ack(self, link: Link, message: Any) -> None:
+        """The other side ends its download, calls off an upload, or wants to be asked in the other form."""
+        upload = self._upload
+        if upload is None or upload.link is not link or message.mission_type != upload.kind:
+            return
+        if message.type == M.MAV_MISSION_OPERATION_CANCELLED:
+            self._upload = None
+        elif message.type == M.MAV_MISSION_UNSUPPORTED and self._autopilot.firmware.plan_is_asked_int:
+            self._asks_int = not self._asks_int
+            self._ask(upload)
 
     def tick(self) -> None:
         """Ask again for what did not come, give up in the end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from sim.autopilot.dialect import M
@@ -59,8 +60,11 @@ class ParameterProtocol:
             return
         kind = store.at(index).kind
         value = message.param_value
+        as_bits = kind != REAL32 and firmware.parameters_as_bits
+        if not math.isfinite(value) and not as_bits:
+            return
         if kind != REAL32:
-            value = bits_to_whole(value) if firmware.parameters_as_bits else round(value)
+            value = bits_to_whole(value) if as_bits else round(value)
         changed = store.set(name, value)
         times = firmware.echoes_when_changed if changed else 1
         for _ in range(times):

@@ -109,7 +109,7 @@ class FlyPlan(Behaviour):
                     self._leg = self._take_off(up)
                     self._leg_seq = -1 if isinstance(self._leg, GoTo) else plan.current
                     return
-                yaw = None if math.isnan(item.param4) or item.param4 == 0.0 else float(item.param4)
+                yaw = None if not math.isfinite(item.param4) or item.param4 == 0.0 else float(item.param4)
                 self._leg = GoTo(Point(north, east, up), yaw=yaw)
                 return
             if item.command == M.MAV_CMD_DO_CHANGE_SPEED and item.param2 > 0:
@@ -134,13 +134,14 @@ class FlyPlan(Behaviour):
             if gap < _PASSED_M and abs(seen.up - target.up) < _PASSED_M:
                 self._arrived = True
                 item = self._plan.mission[self._plan.current]
-                stays = item.param1 if item.command in (_WAYPOINT, _LOITER_TIME) else 0.0
+                stays = item.param1 if item.command in _WITH_STAY else 0.0
                 self._wait_until = vehicle.time + (0.0 if math.isnan(stays) else stays)
         if self._arrived and self._plan.mission[self._plan.current].command == M.MAV_CMD_NAV_LOITER_UNLIM:
             return False
         return self._arrived and vehicle.time >= self._wait_until
 
 
+_WITH_STAY = (M.MAV_CMD_NAV_WAYPOINT, M.MAV_CMD_NAV_LOITER_TIME)
 _WAYPOINT, _LOITER_TIME = M.MAV_CMD_NAV_WAYPOINT, M.MAV_CMD_NAV_LOITER_TIME
 _PLACES = (_WAYPOINT, _LOITER_TIME, M.MAV_CMD_NAV_LOITER_UNLIM, M.MAV_CMD_NAV_SPLINE_WAYPOINT)
 _AMSL_FRAMES = (M.MAV_FRAME_GLOBAL, M.MAV_FRAME_GLOBAL_INT)
@@ -148,7 +149,7 @@ _AMSL_FRAMES = (M.MAV_FRAME_GLOBAL, M.MAV_FRAME_GLOBAL_INT)
 
 def height_of(item: Any, vehicle: Vehicle) -> float:
     """Height of a mission item in the home frame."""
-    if math.isnan(item.z):
+    if not math.isfinite(item.z):
         return vehicle.seen.up
     home = 0.0 if vehicle.home is None else vehicle.home.up
     return float(item.z) - vehicle.ground_amsl if item.frame in _AMSL_FRAMES else float(item.z) + home

@@ -14,7 +14,7 @@ from sim.autopilot.behaviours import (
     Return,
     TakeOff,
 )
-from sim.autopilot.commands import ACCEPTED, REJECTED, UNSUPPORTED, Command, Result, Results
+from sim.autopilot.commands import ACCEPTED, REJECTED, UNSUPPORTED, Command, Result, Results, whole
 from sim.autopilot.dialect import M
 from sim.autopilot.firmware import CRITICAL, FORCE, INFO, Firmware
 from sim.autopilot.motion import Limits
@@ -36,6 +36,7 @@ _MODES |= {name: (81, _custom(main)) for name, main in _MAIN.items() if name not
 _MODES["OFFBOARD"] = (17, _custom(6))
 _MODE_OF = {custom: name for name, (_, custom) in _MODES.items()}
 _STICK_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED")
+_STICK_OVERRIDE = 0.3  # COM_RC_STICK_OV: deflection that takes the vehicle out of an automatic mode
 _NO_FAILSAFE = ("AUTO_RTL", "AUTO_LAND", "AUTO_TAKEOFF", "AUTO_PRECLAND")
 
 
@@ -48,10 +49,10 @@ class Px4(Firmware):
     limits = Limits(
         cruise=4.9,
         accelerate=2.2,
-        brake=0.48,
+        brake=0.45,
         jerk=5.2,
         position_gain=2.2,
-        velocity_gain=1.3,
+        velocity_gain=1.15,
         lag=0.45,
         climb=2.9,
         descend=1.5,
@@ -86,6 +87,7 @@ class Px4(Firmware):
     upload_retry_s, upload_timeout_s = 0.25, 5.0
     parameters_as_bits, tells_index_by_name, echoes_when_changed = True, True, 2
     serves_data_streams = False
+    reboot_refusal, pilot_mode = REJECTED, "POSCTL"
     target_fields = (M.MAV_FRAME_GLOBAL_INT, 0, True)
     cells = 4
     position_error_m, velocity_error_mps = 0.45, 0.06
@@ -169,10 +171,10 @@ class Px4(Firmware):
         super().set_mode(mode, behaviour)
 
     def on_set_mode(self, command: Command) -> Results:
-        if not int(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        if not whole(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return ACCEPTED + REJECTED
-        main = int(command.param2)
-        return ACCEPTED + self._enter(_custom(main, int(command.param3) if main == _MAIN["AUTO"] else 0))
+        main = whole(command.param2)
+        return ACCEPTED + self._enter(_custom(main, whole(command.param3) if main == _MAIN["AUTO"] else 0))
 
     def on_set_mode_message(self, custom_mode: int) -> Results:
         return self._enter(custom_mode)
@@ -216,7 +218,7 @@ class Px4(Firmware):
     def on_takeoff(self, command: Command) -> Results:
         vehicle = self.vehicle
         height = self.parameters["MIS_TAKEOFF_ALT"] + vehicle.seen.up
-        up = height if math.isnan(command.z) else command.z - vehicle.ground_amsl
+        up = command.z - vehicle.ground_amsl if math.isfinite(command.z) else height
         if vehicle.armed and up <= vehicle.seen.up:
             vehicle.say(CRITICAL, "Already higher than takeoff altitude")
             self._takeoff_up = None
@@ -234,7 +236,7 @@ class Px4(Firmware):
         return super().on_return(command)
 
     def on_reposition(self, command: Command) -> Results:
-        flags = 0 if math.isnan(command.param2) else int(command.param2)
+        flags = whole(command.param2)
         plain = flags == 1
         if not plain and self.mode != "AUTO_LOITER":
             return UNSUPPORTED
@@ -248,7 +250,7 @@ class Px4(Firmware):
             return result
         here = self.target_or_seen() if place is None else None
         north, east = (here.north, here.east) if here is not None else place or (0.0, 0.0)
-        yaw = None if math.isnan(command.param4) else math.degrees(command.param4) % 360.0
+        yaw = math.degrees(command.param4) % 360.0 if math.isfinite(command.param4) else None
         speed = command.param1 if command.param1 > 0 else None
         leg = GoTo(Point(north, east, self.up_of_amsl(command.z)), yaw=yaw, speed=speed, straight=True)
         self.failsafe = False
@@ -304,30 +306,30 @@ class Px4(Firmware):
             vehicle.say(INFO, "Mission finished, loitering")
             self.set_mode("AUTO_LOITER", behaviour.holds)
         if self.mode == "OFFBOARD" and vehicle.armed and time - self._setpoint_at > self._setpoint_timeout:
-            self._fail("Failsafe activated", "POSCTL")
+            self.fail_to("POSCTL", "Failsafe activated")
         self._watch_sticks(time)
         self._watch_companion(time)
         self._watch_position(time)
         self._watch_battery()
         self._watch_fence()
 
-    def _fail(self, text: str, mode: str) -> None:
-        self.vehicle.say(CRITICAL, text)
-        self.set_mode(mode)
-        self.failsafe = True
-
     def _watch_sticks(self, time: float) -> None:
         timeout = max(self.parameters["COM_RC_LOSS_T"], self.link_floor_s) + 0.5
         held = time - self.vehicle.sticks.heard_at < timeout
         lost = self._sticks_held and not held
         self._sticks_held = held
+        sticks = self.vehicle.sticks
+        pushed = held and max(abs(sticks.pitch), abs(sticks.roll)) > _STICK_OVERRIDE
+        if pushed and self.vehicle.flying and self.mode.startswith("AUTO_"):
+            self.vehicle.say(INFO, "Pilot took over using sticks")
+            self.pilot("POSCTL")
         if lost and self.vehicle.flying and self.mode not in _NO_FAILSAFE and self.mode != "OFFBOARD":
-            self._fail("Failsafe activated: entering Hold for 5 seconds", "AUTO_LOITER")
+            self.fail_to("AUTO_LOITER", "Failsafe activated: entering Hold for 5 seconds")
             self._hold_until = time + 5.0
         if self._hold_until is not None and time >= self._hold_until:
             self._hold_until = None
             if self.failsafe and self.vehicle.flying:
-                self._fail("Failsafe activated", "AUTO_RTL")
+                self.fail_to("AUTO_RTL", "Failsafe activated")
 
     def _watch_companion(self, time: float) -> None:
         heard = self.companion_heard_at
@@ -338,7 +340,7 @@ class Px4(Firmware):
 
     def _watch_position(self, time: float) -> None:
         if self.vehicle.flying and not self.position_known and self.mode not in ("AUTO_LAND", "ALTCTL"):
-            self._fail("Failsafe activated", "AUTO_LAND")
+            self.fail_to("AUTO_LAND", "Failsafe activated")
 
     def _watch_battery(self) -> None:
         charge = self.vehicle.battery.charge
@@ -353,14 +355,18 @@ class Px4(Firmware):
             action = int(self.parameters["COM_LOW_BAT_ACT"])
             if action > 0 and self._low_said >= 2 and self.vehicle.flying:
                 lands = action == 2 or (action == 3 and self._low_said >= 3)
-                self._fail("Failsafe activated", "AUTO_LAND" if lands else "AUTO_RTL")
+                self.fail_to("AUTO_LAND" if lands else "AUTO_RTL", "Failsafe activated")
 
     def _watch_fence(self) -> None:
         vehicle = self.vehicle
         outside = vehicle.flying and self.breaches_fence(vehicle.seen.north, vehicle.seen.east)
         if outside and not self._breached:
-            vehicle.say(CRITICAL, "Geofence violation: approaching or outside geofence")
-            action = int(self.parameters["GF_ACTION"])
-            if action in (2, 3, 5):
-                self._fail("Failsafe activated", {2: "AUTO_LOITER", 3: "AUTO_RTL", 5: "AUTO_LAND"}[action])
+            self.on_breach(False)
         self._breached = outside
+
+    def on_breach(self, forced: bool) -> None:
+        self.vehicle.say(CRITICAL, "Geofence violation: approaching or outside geofence")
+        actions = {2: "AUTO_LOITER", 3: "AUTO_RTL", 5: "AUTO_LAND"}
+        mode = "AUTO_RTL" if forced else actions.get(int(self.parameters["GF_ACTION"]))
+        if mode is not None:
+            self.fail_to(mode, "Failsafe activated")

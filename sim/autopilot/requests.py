@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from sim.autopilot.commands import ACCEPTED, Command, Results
-from sim.autopilot.dialect import M
+from sim.autopilot.commands import ACCEPTED, Command, Results, whole
+from sim.autopilot.dialect import INT32_MAX, M
 from sim.autopilot.telemetry import BUILDERS
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ class Requests:
             M.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: lambda link, _: self._send(
                 link, M.MAVLINK_MSG_ID_AUTOPILOT_VERSION
             ),
+            M.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
             M.MAV_CMD_GET_HOME_POSITION: lambda link, _: self._send(link, M.MAVLINK_MSG_ID_HOME_POSITION),
         }
         self.message_handlers: dict[int, Callable[[Link, Any], None]] = {
@@ -61,28 +62,36 @@ class Requests:
         return ACCEPTED
 
     def _request_message(self, link: Link, command: Command) -> Results:
-        firmware, number = self._autopilot.firmware, int(command.param1)
+        firmware, number = self._autopilot.firmware, whole(command.param1)
         if number == M.MAVLINK_MSG_ID_MESSAGE_INTERVAL and firmware.requests_interval_message:
-            return self._tell_interval(link, int(command.param2))
+            return self._tell_interval(link, whole(command.param2))
         if number not in BUILDERS:
             return firmware.unknown_request
         return self._send(link, number)
 
     def _set_interval(self, link: Link, command: Command) -> Results:
-        firmware, number = self._autopilot.firmware, int(command.param1)
+        firmware, number = self._autopilot.firmware, whole(command.param1)
         if number not in BUILDERS:
             if firmware.requests_interval_message:
                 self._autopilot.vehicle.say(6, f"No ap_message for mavlink id ({number})")
             return firmware.unknown_interval
-        link.set_interval(number, int(command.param2))
+        link.set_interval(number, whole(command.param2))
         return ACCEPTED
 
     def _get_interval(self, link: Link, command: Command) -> Results:
-        return self._tell_interval(link, int(command.param1))
+        return self._tell_interval(link, whole(command.param1))
 
     def _tell_interval(self, link: Link, number: int) -> Results:
-        link.send(M.MAVLink_message_interval_message(number, link.interval_us(number)))
+        link.send(
+            M.MAVLink_message_interval_message(number & 0xFFFF, min(link.interval_us(number), INT32_MAX))
+        )
         return ACCEPTED
+
+    def _reboot(self, link: Link, command: Command) -> Results:
+        result = self._autopilot.firmware.on_reboot(command)
+        if result == ACCEPTED:
+            self._autopilot.faults.reboot_soon()
+        return result
 
     def _on_timesync(self, link: Link, message: Any) -> None:
         if message.tc1 == 0:

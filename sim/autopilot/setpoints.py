@@ -46,6 +46,8 @@ class Setpoints:
         self._hand_on(message, position)
 
     def _hand_on(self, message: Any, position: Point | None) -> None:
+        if position is not None and not all(map(math.isfinite, position)):
+            return
         velocity = None
         if not message.type_mask & _NO_VELOCITY:
             north, east = message.vx, message.vy
@@ -56,5 +58,11 @@ class Setpoints:
                     north * math.sin(yaw) + east * math.cos(yaw),
                 )
             velocity = (north, east, -message.vz)
-        yaw_deg = None if message.type_mask & _NO_YAW else math.degrees(message.yaw) % 360.0
+            if not all(map(math.isfinite, velocity)):
+                return
+        yaw_deg = (
+            None
+            if message.type_mask & _NO_YAW or not math.isfinite(message.yaw)
+            else math.degrees(message.yaw) % 360.0
+        )
         self._autopilot.firmware.on_setpoint(position, velocity, yaw_deg)

@@ -44,15 +44,19 @@ def global_position_int(a: Autopilot) -> Any:
     home = a.vehicle.home
     return M.MAVLink_global_position_int_message(
         a.time_ms,
-        latitude,
-        longitude,
-        round((a.vehicle.ground_amsl + up) * 1000.0),
-        round((up - (0.0 if home is None else home.up)) * 1000.0),
+        _i32(latitude),
+        _i32(longitude),
+        _mm(a.vehicle.ground_amsl + up),
+        _mm(up - (0.0 if home is None else home.up)),
         _cm(body.velocity_north + error.velocity_north),
         _cm(body.velocity_east + error.velocity_east),
         _cm(-body.velocity_up - error.velocity_up),
         round(body.yaw * 100.0) % 36000,
     )
+
+
+def _mm(metres: float) -> int:
+    return _i32(round(metres * 1000.0))
 
 
 def _cm(metres: float) -> int:
@@ -117,7 +121,7 @@ def sys_status(a: Autopilot) -> Any:
         health &= ~_GPS
     if not firmware.position_known:
         health &= ~_AHRS
-    if firmware.ready:
+    if firmware.prearm_healthy:
         health |= _PREARM
     return M.MAVLink_sys_status_message(
         present,
@@ -194,9 +198,9 @@ def home_position(a: Autopilot) -> Any | None:
         return None
     latitude, longitude = a.vehicle.frame.to_e7(home.north, home.east)
     return M.MAVLink_home_position_message(
-        latitude,
-        longitude,
-        round(a.vehicle.amsl(home.up) * 1000.0),
+        _i32(latitude),
+        _i32(longitude),
+        _mm(a.vehicle.amsl(home.up)),
         home.north,
         home.east,
         -home.up,
@@ -235,11 +239,11 @@ def position_target_global_int(a: Autopilot) -> Any | None:
         return None
     latitude, longitude = a.vehicle.frame.to_e7(target.north, target.east)
     return M.MAVLink_position_target_global_int_message(
-        a.time_ms, frame, mask, _e7(latitude), _e7(longitude), a.vehicle.amsl(target.up), *(0.0,) * 8
+        a.time_ms, frame, mask, _i32(latitude), _i32(longitude), a.vehicle.amsl(target.up), *(0.0,) * 8
     )
 
 
-def _e7(value: int) -> int:
+def _i32(value: int) -> int:
     return max(-(2**31), min(2**31 - 1, value))
 
 

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 from sim.autopilot.address import Address
 from sim.autopilot.core import Autopilot
+from sim.autopilot.firmware import link_floor_s
 from sim.autopilot.settings import STEP_S
 
 _BEHIND_S = 0.25  # wall time a stalled machine may be behind before the vehicle's clock waits for it
@@ -170,16 +171,23 @@ class Driver:
     """
 
     def __init__(self, mocks: list[Mock], speedup: float) -> None:
-        self._mocks, self.speedup = mocks, speedup
+        self._mocks = mocks
+        self.set_speedup(speedup)
+
+    def set_speedup(self, speedup: float) -> None:
+        """Run so many times faster than the wall clock from now on."""
+        self._speedup = speedup
+        for mock in self._mocks:
+            mock.autopilot.firmware.link_floor_s = link_floor_s(speedup)
 
     async def run(self) -> None:
         """Run until cancelled."""
-        period = min(STEP_S, max(0.002, STEP_S / self.speedup))
         last, owed, swept = time.monotonic(), 0.0, time.monotonic()
         while True:
+            period = min(STEP_S, max(0.002, STEP_S / self._speedup))
             await asyncio.sleep(period)
             now = time.monotonic()
-            owed = min(owed + (now - last) * self.speedup, _BEHIND_S * self.speedup)
+            owed = min(owed + (now - last) * self._speedup, _BEHIND_S * self._speedup)
             last = now
             steps = int(owed / STEP_S)
             if steps == 0:

@@ -142,6 +142,7 @@ class Dialogue:
         self.origin = (0, 0, 0)  # 1e-7 degrees, millimetres AMSL
         self.sticks = self.silent = self._streaming = False
         self._beat_at = self._stick_at = -1e9
+        self._ready_since: float | None = None
 
     # ---- what is heard
     @property
@@ -173,6 +174,11 @@ class Dialogue:
         """The pre-arm check of the last SYS_STATUS."""
         status = self.latest.get("SYS_STATUS")
         return bool(status and status.onboard_control_sensors_health & mav.MAV_SYS_STATUS_PREARM_CHECK)
+
+    @property
+    def surely_ready(self) -> bool:
+        """The pre-arm check has stayed healthy: ArduCopter's may read so for a moment too early."""
+        return self._ready_since is not None and self.now - self._ready_since >= 4.0
 
     def begin(self) -> None:
         """Forget what was heard, for a new exchange."""
@@ -213,6 +219,11 @@ class Dialogue:
     def _note(self, kind: str, message: Any) -> None:
         if kind == "GLOBAL_POSITION_INT":
             self._sample(message)
+        elif kind == "SYS_STATUS":
+            if not self.ready:
+                self._ready_since = None
+            elif self._ready_since is None:
+                self._ready_since = self.now
         elif kind == "HEARTBEAT":
             _append_new(self.modes, self.mode)
         elif kind == "EXTENDED_SYS_STATE":
@@ -370,14 +381,14 @@ class Dialogue:
         if self.armed:
             self.long(mav.MAV_CMD_NAV_RETURN_TO_LAUNCH)
             self.wait(lambda: not self.armed, 180)
-        self.wait(lambda: self.ready, 120)
+        self.wait(lambda: self.surely_ready, 120)
         if self.mode != GUIDED[self.flavor]:
             self.guided()
 
     def take_off(self) -> dict[str, list[str]]:
         """The flavour's proper take-off to the hover; the acknowledgements of its steps."""
         acks = {} if self.px4 else {"guided_ack": self.guided()}
-        self.wait(lambda: self.ready, 120)
+        self.wait(lambda: self.surely_ready, 120)
         acks["arm_ack"] = self.long(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1)
         if self.px4:
             z = HEIGHT + self.latest["GLOBAL_POSITION_INT"].alt / 1e3

@@ -46,27 +46,32 @@ class Lockstep:
     """A mock in this process: its time moves on when there is nothing left to read."""
 
     def __init__(self, settings: Settings) -> None:
-        self._autopilot = Autopilot(settings)
-        self._link, self._other = self._autopilot.add_link(), self._autopilot.add_link()
+        self.autopilot = Autopilot(settings)
+        self._link, self._other = self.autopilot.add_link(), self.autopilot.add_link()
         self._codec, self._other_codec = codec(), codec()
         self._inbox: deque[Any] = deque()
         self.now = 0.0
 
     def write(self, frame: bytes) -> None:
-        self._autopilot.receive(self._link, frame)
+        self.autopilot.receive(self._link, frame)
 
     def read(self) -> Any | None:
         if not self._inbox:
             if not self._link.outbox:
-                self._autopilot.advance()
+                self.autopilot.advance()
             self._other.outbox.clear()
             frames, self._link.outbox = self._link.outbox, []
             self._inbox.extend(self._codec.parse_buffer(b"".join(frames)) or [])
-        self.now = self._autopilot.vehicle.time
+        self.now = self.autopilot.clock
         return self._inbox.popleft() if self._inbox else None
 
+    def drain(self) -> None:
+        """Forget what has come and was not read."""
+        self._link.outbox.clear()
+        self._inbox.clear()
+
     def second(self, frame: bytes) -> list[Any]:
-        self._autopilot.receive(self._other, frame)
+        self.autopilot.receive(self._other, frame)
         frames, self._other.outbox = self._other.outbox, []
         return self._other_codec.parse_buffer(b"".join(frames)) or []
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from sim.autopilot.embedded import running
+from sim.autopilot.settings import Settings
 from tests.fixtures_autopilot import StartAutopilot, flavor, start_autopilot
 
 __all__ = ["flavor", "start_autopilot"]
@@ -51,4 +55,27 @@ def test_bad_options_end_with_two_and_one_sentence(options: tuple[str, ...]) -> 
         [sys.executable, "-m", "sim", "autopilot", *options], capture_output=True, timeout=60, check=False
     )
     assert run.returncode == 2
+    assert b"Traceback" not in run.stderr
+
+
+def test_runs_inside_the_callers_event_loop(flavor: str) -> None:
+    async def listen() -> set[str]:
+        settings = Settings(flavor=flavor, speedup=20.0)
+        async with running(settings, ("tcpin://127.0.0.1:0",)) as mock:
+            reader, writer = await asyncio.open_connection("127.0.0.1", mock.addresses[0].port)
+            codec, kinds = m.MAVLink(None, srcSystem=255, srcComponent=190), set()
+            while "HEARTBEAT" not in kinds:
+                data = await asyncio.wait_for(reader.read(4096), 10)
+                kinds |= {message.get_type() for message in codec.parse_buffer(data) or []}
+            writer.close()
+            return kinds
+
+    assert "HEARTBEAT" in asyncio.run(listen())
+
+
+def test_file_of_faults_that_cannot_be_read_ends_with_two(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sim", "autopilot", "--faults", str(tmp_path / "none.toml")]
+    run = subprocess.run(command, capture_output=True, timeout=60, check=False)
+    assert run.returncode == 2
+    assert b"none.toml" in run.stderr
     assert b"Traceback" not in run.stderr

@@ -1,0 +1,140 @@
+"""The control socket: faults, state and speed of a running mock, as lines of JSON over TCP.
+
+    {"fault": {"kind": "gps_lost", "seconds": 10}}    let a fault come
+    {"clear": "gps_lost"} or {"clear": null}          end the faults of a kind, or all
+    {"state": null}                                   the truth about the vehicle
+    {"speedup": 20}                                   times faster than the wall clock
+
+Each line is answered by one: {"ok": true, ...} or {"error": "what is wrong"}. It is for tests and
+demonstrations on one machine, and listens on the loopback interface only.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
+
+from sim.autopilot.core import Autopilot
+from sim.autopilot.faults import Fault
+
+
+def state_of(autopilot: Autopilot) -> dict[str, Any]:
+    """The truth: what the vehicle is and where it is, whatever its estimate or its link says."""
+    vehicle, firmware = autopilot.vehicle, autopilot.firmware
+    body = vehicle.body
+    latitude, longitude = vehicle.frame.to_e7(body.north, body.east)
+    return {
+        "time": autopilot.clock,
+        "boot_time": vehicle.time,
+        "mode": firmware.mode,
+        "armed": vehicle.armed,
+        "ready": firmware.ready,
+        "landed": vehicle.landed.name,
+        "latitude": latitude * 1e-7,
+        "longitude": longitude * 1e-7,
+        "north": body.north,
+        "east": body.east,
+        "up": body.up,
+        "speed": body.speed,
+        "battery_percent": vehicle.battery.percent,
+        "faults": autopilot.faults.active,
+    }
+
+
+def answer(autopilot: Autopilot, line: bytes, set_speedup: Callable[[float], None]) -> dict[str, Any]:
+    """Obey one line."""
+    try:
+        asked = json.loads(line)
+        if not isinstance(asked, dict) or len(asked) != 1:
+            raise ValueError("want one of: fault, clear, state, speedup")
+        (word, value), *_ = asked.items()
+        if word == "fault":
+            autopilot.faults.add(Fault.of(value if isinstance(value, dict) else {}))
+        elif word == "clear":
+            autopilot.faults.clear(value)
+        elif word == "state":
+            return {"ok": True, "state": state_of(autopilot)}
+        elif word == "speedup":
+            if not isinstance(value, int | float) or not 0.01 <= value <= 100:
+                raise ValueError("speedup is from 0.01 to 100")
+            set_speedup(float(value))
+        else:
+            raise ValueError(f"no '{word}'; there are: fault, clear, state, speedup")
+    except ValueError as error:
+        return {"error": str(error)}
+    return {"ok": True}
+
+
+async def serve(
+    autopilot: Autopilot,
+    host: str,
+    port: int,
+    set_speedup: Callable[[float], None],
+    flush: Callable[[], None],
+) -> asyncio.Server:
+    """Open the control socket."""
+
+    async def client(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            while line := await reader.readline():
+                reply = answer(autopilot, line, set_speedup)
+                flush()
+                writer.write(json.dumps(reply).encode() + b"\n")
+                await writer.drain()
+        except ConnectionError:
+            return  # the client went away in the middle of a line
+        finally:
+            writer.close()
+
+    return await asyncio.start_server(client, host, port)
+
+
+class Control:
+    """A client of the control socket of a mock, as a context manager. Blocking."""
+
+    def __init__(self, url: str) -> None:
+        host, _, port = url.removeprefix("tcp://").rpartition(":")
+        self._socket = socket.create_connection((host, int(port)), timeout=10)
+        self._lines = self._socket.makefile("rb")
+
+    def __enter__(self) -> Control:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Hang up."""
+        self._lines.close()
+        self._socket.close()
+
+    def ask(self, **words: Any) -> dict[str, Any]:
+        """One line and its answer; ValueError if the mock finds it wrong."""
+        self._socket.sendall(json.dumps(words).encode() + b"\n")
+        reply: dict[str, Any] = json.loads(self._lines.readline())
+        if "error" in reply:
+            raise ValueError(reply["error"])
+        return reply
+
+    def fault(self, kind: str, **options: Any) -> None:
+        """Let a fault come, now or when its times say."""
+        self.ask(fault={"kind": kind, **options})
+
+    def clear(self, kind: str | None = None) -> None:
+        """End the faults of a kind, or all."""
+        self.ask(clear=kind)
+
+    def state(self) -> dict[str, Any]:
+        """The truth about the vehicle."""
+        state: dict[str, Any] = self.ask(state=None)["state"]
+        return state
+
+    def speedup(self, factor: float) -> None:
+        """Run so many times faster than the wall clock."""
+        self.ask(speedup=factor)

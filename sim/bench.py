@@ -1,0 +1,296 @@
+"""`roisearch-sim bench`: how much faster the planner is than its plain-Python twin, and how its cost grows.
+
+Everything is a ratio within one run, of processor time of the measuring thread, so a busy machine or a slow
+one changes little. One *decision* is one `plan()` through the public interface and the belief update that
+follows it, while a search is flown in which nothing is found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roisearch import Belief, FieldOfView, Regions, SearchState, make_planner, segment_regions
+from roisearch.fov import HEADINGS, MOVES
+from roisearch.planners.settings import settings_for
+from sim.twin import TwinBelief, TwinPlanner
+
+TWIN_AT_LEAST = 150.0
+REGIONS_AT_MOST = 5.0
+LARGE_MAP_AT_MOST = 1.5
+CHUNK = 20
+
+
+def hills(
+    shape: tuple[int, int], middles: list[tuple[float, float]], width: float = 8.0
+) -> NDArray[np.float64]:
+    """Equal Gaussian hills of `width` cells on a map of `shape`, summing to one."""
+    prior = np.zeros(shape)
+    for row, col in middles:
+        top, left = max(0, int(row - 12 * width)), max(0, int(col - 12 * width))
+        near = prior[top : int(row + 12 * width), left : int(col + 12 * width)]
+        down = np.arange(top, top + near.shape[0])[:, None] - row
+        right = np.arange(left, left + near.shape[1])[None, :] - col
+        near += np.exp(-(down**2 + right**2) / (2.0 * width**2))
+    prior /= prior.sum()
+    return prior
+
+
+FIVE_HILLS = [(60.0, 50.0), (40.0, 140.0), (110.0, 100.0), (160.0, 40.0), (150.0, 160.0)]
+
+
+@dataclass
+class Flight:
+    """One search flown for the clock: the decisions, and processor time per decision in chunks."""
+
+    actions: list[str] = field(default_factory=list)
+    cells: list[tuple[int, int]] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+
+    @property
+    def cost(self) -> float:
+        """Seconds of a decision: the lower quartile of the chunks, which a busy machine disturbs least."""
+        return float(np.percentile(self.seconds, 25))
+
+
+def turned(cell: tuple[int, int], near: tuple[int, int]) -> str:
+    """The heading of a move between neighbours."""
+    return HEADINGS[MOVES.index((near[0] - cell[0], near[1] - cell[1]))]
+
+
+def fly(
+    name: str,
+    prior: NDArray[np.float64],
+    steps: int,
+    *,
+    fov: FieldOfView,
+    regions: Regions,
+    start: tuple[int, int] = (5, 5),
+    **options: Any,
+) -> Flight:
+    """Fly `steps` decisions; everything is compiled and set up before the clock runs."""
+    planner = make_planner(name, fov=fov, regions=regions, commit="never", **options)
+    belief = Belief(prior)
+    planner.plan(belief, SearchState(start), np.random.default_rng(0))
+    rng = np.random.default_rng(1)
+    cell, heading, flight = start, "north", Flight()
+    for _ in range(steps // CHUNK):
+        began = time.thread_time()
+        for _ in range(CHUNK):
+            decision = planner.plan(belief, SearchState(cell, heading), rng)
+            near = decision.path[0]
+            heading, cell = turned(cell, near), near
+            if fov.is_point:
+                belief.observe([cell], False, 0.9, 0.9)
+            else:
+                belief.observe(fov.cells(cell, heading, prior.shape), False, 0.9, 0.9)
+            flight.actions.append(decision.action)
+            flight.cells.append(cell)
+        flight.seconds.append((time.thread_time() - began) / CHUNK)
+    return flight
+
+
+def fly_both(
+    name: str, prior: NDArray[np.float64], steps: int, *, fov: FieldOfView, regions: Regions
+) -> tuple[float, float]:
+    """Fly planner and twin side by side with the paper's settings; seconds of a decision of each.
+
+    They take turns in chunks of decisions, the planner five times from the same state, so that whatever
+    else the machine does slows both alike; what counts is the median of its five and the lower quartile of
+    all chunks.
+
+    Raises:
+        AssertionError: when the twin decides otherwise than the planner.
+    """
+    planner = make_planner(name, fov=fov, regions=regions, preset="paper", commit="never")
+    twin = TwinPlanner(settings_for(name, "paper", {"commit": "never"}), fov, regions)
+    belief, twin_belief = Belief(prior), TwinBelief(prior)
+    rng = np.random.default_rng(1)
+    state = SearchState((5, 5))
+    planner.plan(belief, state, np.random.default_rng(0))
+    twin.plan(twin_belief, state.cell, state.heading, 0)
+    costs: list[tuple[float, float]] = []
+    for _ in range(steps // CHUNK):
+        repeats = []
+        for _ in range(5):
+            again, draws, at = belief.copy(), copy.deepcopy(rng), state
+            planner.plan(again, at, copy.deepcopy(rng))  # the copy is cold, the belief of a search is not
+            began = time.thread_time()
+            decisions = []
+            for _ in range(CHUNK):
+                decision = planner.plan(again, at, draws)
+                near = decision.path[0]
+                at = SearchState(near, turned(at.cell, near))
+                again.observe([near], False, 0.9, 0.9)
+                decisions.append((decision.action, near))
+            repeats.append(time.thread_time() - began)
+        began = time.thread_time()
+        twin_decisions = []
+        for _ in range(CHUNK):
+            action, path = twin.plan(twin_belief, state.cell, state.heading, rng.bit_generator.random_raw())
+            state = SearchState(path[0], turned(state.cell, path[0]))
+            twin_belief.observe([path[0]], [False], [0.9], [0.9])
+            twin_decisions.append((action, path[0]))
+        costs.append((float(np.median(repeats)), time.thread_time() - began))
+        assert decisions == twin_decisions, f"{name}: the planner and its twin decide differently"
+        belief = again
+    ours, theirs = (float(np.percentile(side, 25)) / CHUNK for side in zip(*costs, strict=True))
+    return ours, theirs
+
+
+@dataclass
+class Growth:
+    """How the cost of a decision grows with one thing: its values, and the cost of each."""
+
+    title: str
+    values: list[int]
+    seconds: list[float]
+
+
+def against_twin(steps: int, say: Callable[[str], None]) -> dict[str, float]:
+    """The ratios at the paper's settings: twin to planner, and BMDP-O to lite.
+
+    Raises:
+        AssertionError: when the twin decides otherwise than the planner.
+    """
+    prior = hills((200, 200), FIVE_HILLS)
+    regions, fov = segment_regions(prior), FieldOfView.point()
+    ratios: dict[str, float] = {}
+    costs: dict[str, float] = {}
+    for name in ("puct-regions-lite", "puct-regions", "puct"):
+        costs[name], twin = fly_both(name, prior, steps, fov=fov, regions=regions)
+        ratios[name] = twin / costs[name]
+        say(
+            f"{name:18} {ratios[name]:6.0f} times faster than its twin "
+            f"({twin * 1e3:.2f} ms, {costs[name] * 1e6:.1f} us); {steps} decisions, all the same"
+        )
+    ratios["BMDP-O / lite"] = costs["puct-regions"] / costs["puct-regions-lite"]
+    say(f"{'BMDP-O':18} {ratios['BMDP-O / lite']:6.2f} times the lite decision")
+    return ratios
+
+
+def growths(largest: int, steps: int, say: Callable[[str], None]) -> list[Growth]:
+    """How a lite decision with the paper's settings grows: map, regions, sensor, iterations."""
+    point, name = FieldOfView.point(), "puct-regions-lite"
+    found: list[Growth] = []
+
+    def measure(title: str, values: list[int], run: Callable[[int], Flight]) -> None:
+        seconds = []
+        for value in values:
+            say(f"  {title}: {value}")
+            seconds.append(run(value).cost)
+        found.append(Growth(title, values, seconds))
+
+    def with_map(size: int) -> Flight:
+        prior = hills((size, size), FIVE_HILLS)
+        return fly(name, prior, steps, fov=point, regions=segment_regions(prior), preset="paper")
+
+    def with_regions(count: int) -> Flight:
+        side = int(np.ceil(np.sqrt(count)))
+        middles = [(60.0 + 70 * (i // side), 60.0 + 70 * (i % side)) for i in range(count)]
+        prior = hills((660, 660), middles)
+        return fly(name, prior, steps, fov=point, regions=segment_regions(prior), preset="paper")
+
+    prior = hills((200, 200), FIVE_HILLS)
+    regions = segment_regions(prior)
+
+    def with_sensor(cells: int) -> Flight:
+        side = round(cells**0.5)
+        fov = FieldOfView.from_mask(np.ones((side, side)))
+        return fly(name, prior, steps, fov=fov, regions=regions, preset="paper")
+
+    def with_iterations(count: int) -> Flight:
+        return fly(name, prior, steps, fov=point, regions=regions, preset="paper", iterations=count)
+
+    sizes = [size for size in (200, 400, 1000, 2000, 4000) if size <= largest]
+    measure("cells on a side of the map", sizes, with_map)
+    measure("regions of interest", [1, 4, 16, 64], with_regions)
+    measure("cells in the field of view", [1, 9, 25, 49], with_sensor)
+    measure("iterations", [10, 40, 160, 640], with_iterations)
+    return found
+
+
+def table(found: list[Growth]) -> str:
+    """The growths as Markdown, each cost against the first of its row."""
+    lines = ["| cost of a decision grows with | " + " | ".join([""] * 5) + " |", "|---" * 6 + "|"]
+    for growth in found:
+        cells = [
+            f"{value}: x {cost / growth.seconds[0]:.2f}"
+            for value, cost in zip(growth.values, growth.seconds, strict=True)
+        ]
+        lines.append(f"| {growth.title} | " + " | ".join(cells + [""] * (5 - len(cells))) + " |")
+    return "\n".join(lines)
+
+
+def plot(found: list[Growth], path: Path) -> None:
+    """The growths as one picture, a panel each, the cost against the first value's."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, panels = plt.subplots(1, len(found), figsize=(4 * len(found), 3.4), layout="constrained")
+    for panel, growth in zip(panels, found, strict=True):
+        relative = np.array(growth.seconds) / growth.seconds[0]
+        panel.plot(growth.values, relative, "o-", color="#1f6f8b")
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_xticks(growth.values, [str(value) for value in growth.values])
+        panel.minorticks_off()
+        panel.set_ylim(0.5, max(2.0, 2.0 * float(relative.max())))
+        panel.set_xlabel(growth.title)
+        panel.grid(alpha=0.3)
+    panels[0].set_ylabel("cost of a decision, relative")
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def main(arguments: list[str]) -> int:
+    """Run the benchmark; 1 with `--check` when a ratio misses its target, else 0."""
+    parser = argparse.ArgumentParser(prog="roisearch-sim bench", description=main.__doc__)
+    parser.add_argument("--out", type=Path, default=Path("bench"), help="folder for bench.md and bench.png")
+    parser.add_argument("--steps", type=int, default=100, help="decisions that the twin flies (default 100)")
+    parser.add_argument("--largest", type=int, default=4000, help="side of the largest map (default 4000)")
+    parser.add_argument("--check", action="store_true", help="exit 1 when a target is missed")
+    options = parser.parse_args(arguments)
+    if options.steps < CHUNK or options.largest < 200:
+        parser.error(f"--steps must be at least {CHUNK} and --largest at least 200")
+    lines: list[str] = []
+
+    def say(line: str) -> None:
+        print(line, flush=True)
+        lines.append(line)
+
+    def whisper(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    say(
+        "paper settings: 200 x 200 cells, 5 regions, 40 iterations, rollout 60, point sensor, update included"
+    )
+    ratios = against_twin(options.steps, say)
+    found = growths(options.largest, 10 * options.steps, whisper)
+    large = found[0].seconds[-1] / found[0].seconds[0]
+    targets = [
+        (f"twin / lite at least {TWIN_AT_LEAST:.0f}", ratios["puct-regions-lite"] >= TWIN_AT_LEAST),
+        (f"BMDP-O / lite at most {REGIONS_AT_MOST:.0f}", ratios["BMDP-O / lite"] <= REGIONS_AT_MOST),
+        (f"largest map / 200 x 200 at most {LARGE_MAP_AT_MOST}", large <= LARGE_MAP_AT_MOST),
+    ]
+    say("")
+    say(table(found))
+    say("")
+    for target, met in targets:
+        say(f"{'met   ' if met else 'MISSED'} {target}")
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / "bench.md").write_text("\n".join(["# Benchmark", "", *lines, ""]), encoding="utf-8")
+    plot(found, options.out / "bench.png")
+    print(f"written: {options.out / 'bench.md'}, {options.out / 'bench.png'}")
+    return 1 if options.check and not all(met for _, met in targets) else 0

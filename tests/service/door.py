@@ -11,7 +11,7 @@ import httpx
 from prometheus_client import CollectorRegistry
 
 from service.config import HttpSettings
-from service.http import Access, Door, Server, create_app, open_door
+from service.http import Access, Door, Server, create_app, open_door, read_access
 from service.reports import Receipt, Report
 
 COMMAND, REPORT = "command-token-0123456789", "report-token-0123456789"
@@ -62,6 +62,9 @@ def bearer(token: str) -> dict[str, str]:
     return {"authorization": f"Bearer {token}"}
 
 
+TOKENS = read_access(settings(), both_tokens(), loopback=False)
+
+
 def in_memory(
     run: FakeRun, *, http: HttpSettings | None = None, access: Access | None = None, **more: Any
 ) -> httpx.AsyncClient:
@@ -104,3 +107,23 @@ async def say(door: Door, data: bytes, *, pause_s: float = 0.0, patience_s: floa
         return answer
     finally:
         writer.close()
+
+
+def ask(
+    method: str,
+    path: str,
+    *,
+    json: Any = None,
+    headers: dict[str, str] | None = None,
+    access: Access | None = None,
+    http: HttpSettings | None = None,
+    run: FakeRun | None = None,
+    **more: Any,
+) -> httpx.Response:
+    """One request to a fresh door."""
+
+    async def once() -> httpx.Response:
+        async with in_memory(run or FakeRun(), http=http, access=access, **more) as client:
+            return await client.request(method, path, json=json, headers=headers)
+
+    return asyncio.run(once())

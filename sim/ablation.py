@@ -73,7 +73,8 @@ def main(arguments: list[str]) -> int:
             ratios = times[:, i] / times[:, 0]
             whole = times[:, i].sum() / times[:, 0].sum()
             print(
-                f"  {len(times)} priors, {name}: {whole - 1:.1%} above the bound, mean of ratios {ratios.mean() - 1:.1%}"
+                f"  {len(times)} priors, {name}: {whole - 1:.1%} above the bound, "
+                f"mean of ratios {ratios.mean() - 1:.1%}"
             )
     return 0
 

@@ -411,7 +411,10 @@ class SweepPlanner:
         """Compile every kernel that a decision and an observation use, on a tiny map."""
         from roisearch.planners.warm import warm_up
 
-        warm_up(SweepPlanner(self.settings, name=self.name, fov=self._fov), self._fov, progress)
+        def make(ground: NDArray[np.bool_]) -> SweepPlanner:
+            return SweepPlanner(self.settings, name=self.name, fov=self._fov, flyable=ground)
+
+        warm_up(make, self._fov, progress)
 
 
 def remark(unreachable: float) -> str:

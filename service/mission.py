@@ -224,7 +224,7 @@ class Mission:
             await self.happen(Event.AIRBORNE, f"at {height:.0f} m")
         except LinkError as error:
             await self.clock.sleep(RETRY_S)  # what the pilot did is told by an event of its own
-            if self.state != State.YIELDED:
+            if self.state == State.TAKEOFF:
                 raise
             log.warning("%s", error)
 

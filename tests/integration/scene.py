@@ -19,17 +19,31 @@ from tests.integration.tap import Tap
 
 SPEEDUP = 10.0
 TARGET = "47.0508,8.3017"
-SETTINGS = "[flight]\naltitude_m = 15\n[sensor]\ncell_m = 20\n[search]\nstop_at_pos = 0.999\n"
+SETTINGS = """
+[flight]
+altitude_m = 15
+settle_s = {settle_s}
+[sensor]
+cell_m = 20
+p_tn = 0.99
+"""
 
 
 class Scene:
     """One flight under way. Times asked for are in vehicle time; patience is in wall time."""
 
     def __init__(
-        self, runs: Path, service: Process, control: Control, tap: Tap, door: httpx.Client, speedup: float
+        self,
+        runs: Path,
+        service: Process,
+        detector: Process,
+        control: Control,
+        tap: Tap,
+        door: httpx.Client,
+        speedup: float,
     ) -> None:
-        self.runs, self.service, self.control, self.tap, self.door = runs, service, control, tap, door
-        self.speedup = speedup
+        self.runs, self.service, self.detector = runs, service, detector
+        self.control, self.tap, self.door, self.speedup = control, tap, door, speedup
         self._seen = 0
 
     @property
@@ -109,9 +123,8 @@ def flight(
     flavor: str = "px4",
     *,
     speedup: float = SPEEDUP,
-    settings: str = SETTINGS,
+    settle_s: float = 3.0,
     target: str | None = None,
-    reports: bool = True,
     options: tuple[str, ...] = (),
 ) -> Iterator[Scene]:
     """A search that has just been started, over a field with nothing in it unless a target is given."""
@@ -122,7 +135,7 @@ def flight(
         control = stack.enter_context(Control(autopilot.control))
         tap = stack.enter_context(Tap(autopilot.port))
         file = folder / "settings.toml"
-        file.write_text(settings, encoding="utf-8")
+        file.write_text(SETTINGS.format(settle_s=settle_s), encoding="utf-8")
         area = write_area(folder, FIELD if target else plain(FIELD))
         runs = folder / "runs"
         words = service_words(area, runs, "--connect", tap.url, "--takeoff", "--config", str(file))
@@ -130,10 +143,9 @@ def flight(
         service = stack.enter_context(running(*words))
         address = service.wait_for(r"listening on (http://\S+)").group(1)
         door = stack.enter_context(httpx.Client(base_url=address, timeout=30.0))
-        if reports:
-            where = ["--target", target] if target else ["--p-tn", "0.999"]
-            stack.enter_context(running("sim", "detector", "--service", address, *where))
-        yield Scene(runs, service, control, tap, door, speedup)
+        where = ["--p-tn", "0.99", *(["--target", target] if target else [])]
+        detector = stack.enter_context(running("sim", "detector", "--service", address, *where))
+        yield Scene(runs, service, detector, control, tap, door, speedup)
 
 
 def plain(area: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A tap on the wire between the service and a mock autopilot: carries every datagram and notes what the service says."""
+"""A tap on the wire between the service and a mock autopilot: carries every datagram, notes what the service says."""
 
 from __future__ import annotations
 

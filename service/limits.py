@@ -88,13 +88,15 @@ class PositionTrust:
     """Whether the position may be trusted, and when it could not be.
 
     A position that was doubted is trusted again once there was nothing to object to for `flight.settle_s`
-    seconds. A jump counts as an objection at its moment. `fresh_s`: see `position_objections`.
+    seconds (the first time at once). A jump counts as an objection at its moment. `fresh_s`: see
+    `position_objections`.
     """
 
     def __init__(self, flight: FlightSettings, fresh_s: float) -> None:
         self._flight, self._fresh_s = flight, fresh_s
         self._last: Sample | None = None
-        self._well_since = -math.inf
+        self._was_good = False
+        self._well_since = math.inf
         self._doubted: deque[tuple[float, float]] = deque(maxlen=_REMEMBERED)  # closed intervals of the clock
         self.doubts: list[str] = []
         """Why the position is not trusted now, as sentences' ends; empty: it is."""
@@ -108,10 +110,11 @@ class PositionTrust:
             self.doubts, self._well_since = objections, math.inf
         elif self.doubts:
             self._well_since = min(self._well_since, now)
-            if now - self._well_since >= self._flight.settle_s:
+            if now - self._well_since >= self._flight.settle_s or not self._was_good:
                 began, _ = self._doubted[-1]
                 self._doubted[-1] = (began, now)
                 self.doubts = []
+        self._was_good |= not self.doubts
         return self.doubts
 
     def trusted_at(self, time: float) -> bool:

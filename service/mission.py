@@ -31,7 +31,7 @@ from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.limits import energy_objection
 from service.mavlink import LinkError, Vehicle
-from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken
+from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
 from service.search import Reason, Search
 from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
@@ -40,6 +40,7 @@ from service.takeover import Takeovers
 log = logging.getLogger("roisearch")
 TICK_S = 0.1
 RETRY_S = 1.0
+REFUSALS = 2  # so many waypoints in a row that are not flown are no bad luck
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 BLIND = {"link", "position"}  # causes of a hold during which the aircraft cannot be sent home either
 
@@ -78,6 +79,7 @@ class Mission:
         self._homeward = False  # a hold on the way home goes on home
         self._direct = False  # the way home is the autopilot's own: ours could not be flown
         self._resend = False  # the last waypoint may have been lost
+        self._refused = 0  # waypoints in a row that were not flown
         self._takeovers = Takeovers()
         flight = settings.flight
         self._navigator = Navigator(
@@ -437,20 +439,32 @@ class Mission:
                 await self._write("not taken", {"lat": event.target.lat, "lon": event.target.lon})
                 if event.time != stalled_at:  # given up because we stood still: it is sent again
                     await self._not_taken(event)
+            elif isinstance(event, TargetTaken):
+                self._refused = 0
             elif isinstance(event, LinkLost):
                 await self.hold("link", "the autopilot is silent")
             if why := self._takeovers.read(event, landing=self.state == State.RETURNING):
                 await self.happen(Event.PILOT, why)
             if self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
-                self.why_stopped = self.why_stopped or f"landed before the search was over: {self.why_here}"
+                why = f"landed before the search was over: {self.why_here}"
+                said = self._takeovers.said()  # often told only after the mode has changed
+                self.why_stopped = self.why_stopped or why + (said if said not in why else "")
                 await self.happen(Event.LANDED, "on the ground, disarmed")
 
     async def _not_taken(self, event: TargetNotTaken) -> None:
-        """The autopilot does not fly to the waypoint: hold, for what that is most likely due to."""
-        if not self.helm.heard():
+        """The autopilot does not fly to the waypoint: hold, for what that is most likely due to.
+
+        On a bad radio a waypoint may get lost as often as it is repeated, so another one is tried first.
+        """
+        self._refused += 1
+        if self.state not in (*FLYING, State.RETURNING):
+            log.warning("the stop is not flown: %s", event.reason)
+        elif not self.helm.heard():
             await self.hold("link", "the autopilot is silent")
         elif doubts := self.helm.doubts():
             await self.hold("position", "; ".join(doubts))
+        elif self._refused < REFUSALS:
+            self._resend = True
         else:
             await self.hold("target", f"the waypoint is not flown: {event.reason}")
 

@@ -75,7 +75,7 @@ def test_the_autopilots_own_return_is_left_alone_and_ends_the_run(
     with flight(tmp_path, flavor) as scene:
         scene.searching()
         scene.control.fault(kind, **options)
-        scene.reaches("YIELDED", words)
+        scene.reaches("YIELDED", "RTL")
         motions = len(scene.tap.motions)
         code, report = scene.ends()
         assert scene.tap.motions[motions:] == []

@@ -444,7 +444,9 @@ class Mission:
             elif isinstance(event, LinkLost):
                 await self.hold("link", "the autopilot is silent")
             if why := self._takeovers.read(event, landing=self.state == State.RETURNING):
-                await self.happen(Event.PILOT, why)
+                if not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
+                    self.why_here += f"; {why}"
+                    await self._write("yielded", {"reason": why})
             if self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
                 why = f"landed before the search was over: {self.why_here}"
                 said = self._takeovers.said()  # often told only after the mode has changed

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+
+import numpy as np
+
+from roisearch.place import Place
+from service.area.frame import GridFrame
+from service.mavlink.telemetry import Telemetry
 
 LatLon = tuple[float, float]
 
@@ -20,6 +27,11 @@ class Flight:
     hits: list[LatLon] = field(default_factory=list)
     latencies_s: list[float] = field(default_factory=list)
 
+    def record(self, t: Telemetry, now: float) -> None:
+        """Add the aircraft's place to the track while it flies."""
+        if t.armed and t.position_known:
+            self.track.append((now, t.lat, t.lon, t.alt_home_m))
+
 
 @dataclass(frozen=True)
 class Found:
@@ -29,3 +41,10 @@ class Found:
     lon: float
     probability: float
     sigma_m: float
+
+    @classmethod
+    def at(cls, frame: GridFrame, place: Place) -> Found:
+        """From a place of the grid."""
+        lat, lon = frame.to_latlon(np.array([place.centroid]))[0]
+        sigma = math.sqrt(float(np.linalg.eigvalsh(place.covariance)[-1])) * frame.cell_m
+        return cls(float(lat), float(lon), place.probability, sigma)

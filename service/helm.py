@@ -127,16 +127,30 @@ class Helm:
         except BadInput:  # there is no way at all
             return False
 
-    def stuck(self) -> str:
-        """Why the aircraft counts as stuck on its way to the waypoint, or nothing."""
-        if self._target is None:
-            return ""
-        return self._progress.stuck(self.distance(self.here(), self._target), self.clock.now())
+    def trouble(self, *, moving: bool) -> NotSent | None:
+        """What stands against flying on while the autopilot follows our waypoints, or nothing."""
+        doubts = self.doubts()
+        if not self.vehicle.telemetry.guided:
+            return None
+        if doubts:
+            return NotSent("position", "; ".join(doubts))
+        if moving and self._target is not None:
+            stuck = self._progress.stuck(self.distance(self.here(), self._target), self.clock.now())
+            return NotSent("progress", stuck) if stuck else None
+        return None
 
     def too_windy(self) -> str:
         """Why the wind is too much, once it has lasted, or nothing."""
         objection = wind_objection(self.vehicle.telemetry, self.settings.flight)
         return self._windy.after(objection, self.clock.now())
+
+    def route(self, goal: LatLon) -> list[LatLon]:
+        """The way from here to `goal` around the exclusions; straight there when they leave none."""
+        try:
+            return way_home(self.grid, self.here(), goal)
+        except BadInput as error:
+            log.warning("%s", error)
+            return [goal]
 
     def heard(self) -> bool:
         """A heartbeat has come lately."""

@@ -48,6 +48,11 @@ def energy_objection(t: Telemetry, flown_s: float, flight: FlightSettings) -> st
     return f"{flown_s:.0f} s in the air" if flown_s >= flight.max_flight_s else ""
 
 
+def hold_objection(held_s: float, flight: FlightSettings) -> str:
+    """Why hovering for a fault has to end after so many seconds, or nothing."""
+    return f"hovered for {held_s:.0f} s" if held_s > flight.max_hold_s else ""
+
+
 def wind_objection(t: Telemetry, flight: FlightSettings) -> str:
     """Why the wind is too much, or nothing; an autopilot that does not tell the wind has none."""
     if t.wind is None or t.wind.speed_mps <= flight.max_wind_mps:

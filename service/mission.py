@@ -11,25 +11,19 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import math
 import sqlite3
 import time
 from collections.abc import Awaitable, Callable, Mapping
 
-import numpy as np
-
 from roisearch import Decision
-from roisearch.place import Place
-from service.area import way_home
 from service.clock import Clock
 from service.config import Settings
-from service.errors import BadInput
 from service.evidence import Observation
 from service.flight import Flight, Found, LatLon
 from service.helm import LEAST_PATIENCE_WALL_S, Helm
 from service.intake import Intake, JournalLost
 from service.journal import Journal
-from service.limits import energy_objection
+from service.limits import energy_objection, hold_objection
 from service.mavlink import LinkError, Vehicle
 from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
@@ -42,6 +36,7 @@ TICK_S = 0.1
 RETRY_S = 1.0
 REFUSALS = 2  # so many waypoints in a row that are not flown are no bad luck
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
+MOVING = (*FLYING, State.RETURNING)
 BLIND = {"link", "position"}  # causes of a hold during which the aircraft cannot be sent home either
 
 
@@ -81,24 +76,15 @@ class Mission:
         self._resend = False  # the last waypoint may have been lost
         self._refused = 0  # waypoints in a row that were not flown
         self._takeovers = Takeovers()
-        flight = settings.flight
-        self._navigator = Navigator(
-            self.frame.cell_m, flight.speed_mps, flight.deceleration_mps2, flight.corner_m
-        )
+        fly = settings.flight
+        self._navigator = Navigator(self.frame.cell_m, fly.speed_mps, fly.deceleration_mps2, fly.corner_m)
         self._thinking: asyncio.Task[Decision] | None = None
         self._hit_at: float | None = None
         self._last_cell: Cell | None = None
         self._changed = asyncio.Event()
         self._wake = asyncio.Event()
         self._group = asyncio.TaskGroup()
-        self.helm = Helm(
-            settings,
-            clock,
-            search.grid,
-            vehicle,
-            may_move=lambda: self.state in MAY_MOVE,
-            write=self._write,
-        )
+        self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
 
     # ---- state -------------------------------------------------------------------------------------------
 
@@ -167,6 +153,9 @@ class Mission:
         elif command == "abort":
             self.why_stopped = "the operator aborted the run"
             await self.happen(Event.ABORT, "the operator asked")
+
+    def _may_move(self) -> bool:
+        return self.state in MAY_MOVE
 
     def flight_time(self) -> float:
         """Seconds in the air so far."""
@@ -265,7 +254,7 @@ class Mission:
         """Found, searched enough, too little energy, or nobody looking?"""
         settings, place = self.settings, self.search.place
         if place.probability >= settings.search.found_at and self.search.was_hit(place):
-            self.found = self._locate_target(place)
+            self.found = Found.at(self.frame, place)
             await self._write("found", vars(self.found))
             lat, lon = self.found.lat, self.found.lon
             await self.happen(Event.CONFIRMED, f"found at {lat:.6f}, {lon:.6f}, p = {place.probability:.4f}")
@@ -301,16 +290,13 @@ class Mission:
                 self._direct = self._homeward
                 self.why_stopped = why
                 await self._stop_searching(Event.ENERGY_LOW)
-            elif not self._holds & {*BLIND, "operator"} and (why := self._held_too_long()):
+            elif not self._holds & {*BLIND, "operator"} and (
+                why := hold_objection(self.clock.now() - self._held_since, self.settings.flight)
+            ):
                 self._direct = self._homeward
                 self.why_stopped = self.why_stopped or why
                 await self.happen(Event.RETURN, why)
             await self._tick()
-
-    def _held_too_long(self) -> str:
-        """Why hovering has to end, or nothing."""
-        held = self.clock.now() - self._held_since
-        return f"hovered for {held:.0f} s" if held > self.settings.flight.max_hold_s else ""
 
     def _detector_silent(self) -> bool:
         """No report for too long; never shorter than what a busy host may need in wall time."""
@@ -341,8 +327,9 @@ class Mission:
             await self._decided(decision)
         thinking_s = self.settings.search.deadline_s * self.clock.speedup
         if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
+            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes.verdict]
             self._thinking = asyncio.create_task(
-                self.search.decide(navigator.waypoint, navigator.heading, self._unseen(navigator.ahead))
+                self.search.decide(navigator.waypoint, navigator.heading, unseen)
             )
             self._thinking.add_done_callback(lambda _: self._wake.set())
         target = navigator.due(remaining, speed)
@@ -373,7 +360,7 @@ class Mission:
     async def _go_home(self) -> None:
         """Fly home around what must not be flown over, then let the autopilot land."""
         if self.vehicle.telemetry.guided and not self._direct:
-            for point in self._route(self.search.grid.launch)[:-1]:
+            for point in self.helm.route(self.search.grid.launch)[:-1]:
                 if not await self._fly_to(point):
                     return
         await self._command(self.vehicle.return_to_launch(), "return to launch")
@@ -385,17 +372,9 @@ class Mission:
 
     async def _fly_route(self, goal: Cell) -> None:
         """Fly to a cell around what must not be flown over; ends early when the state changes."""
-        for point in self._route(self.helm.latlon(goal)):
+        for point in self.helm.route(self.helm.latlon(goal)):
             if not await self._fly_to(point):
                 return
-
-    def _route(self, goal: LatLon) -> list[LatLon]:
-        """The way from here to `goal` around the exclusions; straight there when they leave none."""
-        try:
-            return way_home(self.search.grid, self.helm.here(), goal)
-        except BadInput as error:
-            log.warning("%s", error)
-            return [goal]
 
     async def _fly_to(self, point: LatLon) -> bool:
         """Fly straight to a point; False when the state changed on the way."""
@@ -416,13 +395,10 @@ class Mission:
     async def _guard(self) -> None:
         """Ten times a second: can the position be trusted, is the waypoint flown, is there too much wind?"""
         while True:
-            doubts, ours = self.helm.doubts(), self.vehicle.telemetry.guided
-            if doubts and ours and self.state in (*FLYING, State.RETURNING, State.HOLDING):
-                await self.hold("position", "; ".join(doubts))
-            elif ours and self.state in (*FLYING, State.RETURNING) and (why := self.helm.stuck()):
-                await self.hold("progress", why)
-            windy = self.helm.too_windy()
-            if windy and self.state in FLYING:
+            trouble = self.helm.trouble(moving=self.state in MOVING)
+            if trouble is not None and self.state in (*MOVING, State.HOLDING):
+                await self.hold(trouble.cause, trouble.reason)
+            if self.state in FLYING and (windy := self.helm.too_windy()):
                 self.why_stopped = windy
                 await self.happen(Event.RETURN, windy)
             await self.clock.sleep(TICK_S)
@@ -443,10 +419,10 @@ class Mission:
                 self._refused = 0
             elif isinstance(event, LinkLost):
                 await self.hold("link", "the autopilot is silent")
-            if why := self._takeovers.read(event, landing=self.state == State.RETURNING):
-                if not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
-                    self.why_here += f"; {why}"
-                    await self._write("yielded", {"reason": why})
+            why = self._takeovers.read(event, landing=self.state == State.RETURNING)
+            if why and not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
+                self.why_here += f"; {why}"
+                await self._write("yielded", {"reason": why})
             if self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
                 why = f"landed before the search was over: {self.why_here}"
                 said = self._takeovers.said()  # often told only after the mode has changed
@@ -459,7 +435,7 @@ class Mission:
         On a bad radio a waypoint may get lost as often as it is repeated, so another one is tried first.
         """
         self._refused += 1
-        if self.state not in (*FLYING, State.RETURNING):
+        if self.state not in MOVING:
             log.warning("the stop is not flown: %s", event.reason)
         elif not self.helm.heard():
             await self.hold("link", "the autopilot is silent")
@@ -473,11 +449,8 @@ class Mission:
     async def _keep_track(self) -> None:
         """The track, once a second."""
         while True:
-            telemetry = self.vehicle.telemetry
-            if telemetry.armed and telemetry.position_known and not self.helm.on_ground():
-                self.flight.track.append(
-                    (self.clock.now(), telemetry.lat, telemetry.lon, telemetry.alt_home_m)
-                )
+            if not self.helm.on_ground():
+                self.flight.record(self.vehicle.telemetry, self.clock.now())
             await self.clock.sleep(1.0)
 
     # ---- commands ----------------------------------------------------------------------------------------
@@ -525,12 +498,3 @@ class Mission:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(TICK_S / self.clock.speedup):
                 await self._wake.wait()
-
-    def _unseen(self, cells: tuple[Cell, ...]) -> list[Cell]:
-        """Those of `cells` that have not been looked at in this pass."""
-        return [cell for cell in cells if cell not in self.intake.passes.verdict]
-
-    def _locate_target(self, place: Place) -> Found:
-        lat, lon = self.frame.to_latlon(np.array([place.centroid]))[0]
-        sigma = math.sqrt(float(np.linalg.eigvalsh(place.covariance)[-1])) * self.frame.cell_m
-        return Found(float(lat), float(lon), place.probability, sigma)

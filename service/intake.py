@@ -55,7 +55,9 @@ class Intake:
         pose = self._pose(report)
         if pose is None:
             self.refused += 1
-            reason = f"no position of the aircraft is known for captured_at {report.captured_at:.3f}"
+            reason = (
+                f"no position of the aircraft is known and trusted for captured_at {report.captured_at:.3f}"
+            )
             return Receipt(id=report.id, status="refused", reason=reason)
         written = self._pending[report.id] = asyncio.Event()
         footprint = self.sensor.footprint(pose)

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from service.config import Settings
-from service.mission import LatLon, Mission
+from service.flight import LatLon
+from service.mission import Mission
 from service.states import State
 
 log = logging.getLogger("roisearch")

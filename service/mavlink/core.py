@@ -321,6 +321,7 @@ class LinkCore:
         if after.mode != before.mode:
             self._mode_changed(autopilot, before.mode, now)
         self._done(self._book.on_mode(after.mode, now))
+        self._done(self._book.on_armed(after.armed, now))
         if after.armed != before.armed:
             commanded = self._control.on_armed(after.armed, now)
             if not after.armed:

@@ -63,6 +63,12 @@ class FlightSettings(Section):
     min_battery_percent: float = Field(default=20.0, ge=0, le=95)
     max_flight_s: float = Field(default=7200.0, gt=0)
     max_launch_distance_m: float = Field(default=20_000.0, gt=0)
+    min_satellites: int = Field(default=6, ge=0, le=40)
+    max_jump_m: float = Field(default=10.0, gt=0)
+    settle_s: float = Field(default=3.0, ge=0, le=600)
+    max_wind_mps: float = Field(default=12.0, gt=0)
+    stuck_after_s: float = Field(default=15.0, ge=2)
+    max_hold_s: float = Field(default=900.0, gt=0)
 
 
 class SensorSettings(Section):

@@ -1,9 +1,9 @@
 """The mission: one search, from the first heartbeat to the ground.
 
 `Mission.run` goes through the phases; a watcher beside it listens to the vehicle. Both change the state only
-through `happen`, which looks the table of `service.states` up, journals the transition and tells the pilot. Every
-command that moves the aircraft passes `_send`, which asks for a state that may move, checks the leg, and writes
-the command to the journal before it goes out.
+through `happen`, which looks the table of `service.states` up, journals the transition and tells the pilot. A guard
+looks ten times a second at what `service.limits` objects to. Every waypoint passes the helm, which asks for a state
+that may move, a position to trust and a leg that is clear, and writes it to the journal before it goes out.
 """
 
 from __future__ import annotations
@@ -11,57 +11,33 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import math
 import sqlite3
 import time
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
-
-import numpy as np
 
 from roisearch import Decision
-from roisearch.place import Place
-from service.area import leg_is_clear, way_home
 from service.clock import Clock
 from service.config import Settings
-from service.evidence import Observation, grid_heading
+from service.evidence import Observation
+from service.flight import Flight, Found, LatLon
+from service.helm import LEAST_PATIENCE_WALL_S, Helm
 from service.intake import Intake, JournalLost
 from service.journal import Journal
+from service.limits import energy_objection, hold_objection
 from service.mavlink import LinkError, Vehicle
-from service.mavlink.events import LinkLost, ModeChanged, TargetNotTaken
+from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
 from service.search import Reason, Search
 from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
+from service.takeover import Takeovers
 
 log = logging.getLogger("roisearch")
-LatLon = tuple[float, float]
 TICK_S = 0.1
-LEAST_PATIENCE_WALL_S = 1.5
+RETRY_S = 1.0
+REFUSALS = 2  # so many waypoints in a row that are not flown are no bad luck
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
-
-
-@dataclass
-class Flight:
-    """What the flight has been so far; times in the service's clock, distances in metres."""
-
-    began: float = 0.0
-    ended: float = 0.0
-    steps: int = 0
-    decisions: int = 0
-    waypoints: int = 0
-    track: list[tuple[float, float, float, float]] = field(default_factory=list)  # time, lat, lon, height
-    hits: list[LatLon] = field(default_factory=list)
-    latencies_s: list[float] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Found:
-    """The target's place: position in degrees, probability of the neighbourhood, 1-sigma in metres."""
-
-    lat: float
-    lon: float
-    probability: float
-    sigma_m: float
+MOVING = (*FLYING, State.RETURNING)
+BLIND = {"link", "position"}  # causes of a hold during which the aircraft cannot be sent home either
 
 
 class Mission:
@@ -90,21 +66,25 @@ class Mission:
         self.found: Found | None = None
         self.reason = Reason("waiting for the aircraft", ())
         self.path: tuple[Cell, ...] = ()
+        self.why_here = ""  # the reason of the last transition
         self.why_stopped = ""
         self.searched = False  # the search ended because there was nothing more to gain, not by an order
         self._holds: set[str] = set()
+        self._held_since = 0.0
         self._homeward = False  # a hold on the way home goes on home
-        flight = settings.flight
-        self._navigator = Navigator(
-            self.frame.cell_m, flight.speed_mps, flight.deceleration_mps2, flight.corner_m
-        )
+        self._direct = False  # the way home is the autopilot's own: ours could not be flown
+        self._resend = False  # the last waypoint may have been lost
+        self._refused = 0  # waypoints in a row that were not flown
+        self._takeovers = Takeovers()
+        fly = settings.flight
+        self._navigator = Navigator(self.frame.cell_m, fly.speed_mps, fly.deceleration_mps2, fly.corner_m)
         self._thinking: asyncio.Task[Decision] | None = None
         self._hit_at: float | None = None
         self._last_cell: Cell | None = None
         self._changed = asyncio.Event()
         self._wake = asyncio.Event()
         self._group = asyncio.TaskGroup()
-        self._altitude_m = 0.0  # above sea level, known once home is
+        self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
 
     # ---- state -------------------------------------------------------------------------------------------
 
@@ -113,8 +93,17 @@ class Mission:
         before, after = self.state, next_state(self.state, event)
         if before == after:
             return False
-        self.state = after
+        self.state, self.why_here = after, reason
         self._homeward = after == State.RETURNING or (self._homeward and after == State.HOLDING)
+        if not (before in FLYING and after in FLYING):
+            self.helm.rest()
+        if after == State.HOLDING:
+            self._held_since = self.clock.now()
+        elif after == State.YIELDED:
+            self._holds.clear()
+            self.vehicle.release_control(reason)
+        elif after == State.DONE:
+            self.flight.ended = self.clock.now()
         self._changed.set()
         self._drop_thought()
         log.info("%s → %s: %s", before, after, reason)
@@ -126,12 +115,8 @@ class Mission:
     async def hold(self, cause: str, reason: str) -> None:
         """Hover until `cause` is gone; several causes can hold at once."""
         self._holds.add(cause)
-        if await self.happen(Event.HOLD, reason):
-            await self._write("command", {"command": "hold"})
-            try:
-                self.vehicle.hold()
-            except LinkError as error:
-                log.warning("hold: %s", error)
+        if await self.happen(Event.HOLD, reason) and (refusal := await self.helm.hover()) is not None:
+            log.warning("no hold was sent: %s", refusal.reason)
 
     async def release(self, cause: str, reason: str) -> None:
         """`cause` no longer holds; the search goes on when nothing else does."""
@@ -142,12 +127,23 @@ class Mission:
     async def order(self, command: str) -> str:
         """An operator's order: hold, resume, return or abort. Returns what came of it, in words."""
         await self._write("order", {"command": command, "state": self.state})
+        try:
+            await self._obey(command)
+        except LinkError as error:
+            log.warning("%s: %s", command, error)
+            self.vehicle.status_text(f"search {self.state}: {command} failed: {error}")
+        return self.state.value
+
+    async def _obey(self, command: str) -> None:
+        ours = self.vehicle.in_control and self.vehicle.telemetry.guided
         if command == "hold":
+            if self.state == State.RETURNING and not ours:  # the autopilot flies home by itself
+                await self.vehicle.enter_guided()
             await self.hold("operator", "the operator asked")
         elif command == "resume":
-            self._holds.clear()
-            if self.state == State.YIELDED:
+            if self.state in (State.YIELDED, State.HOLDING) and not ours:
                 await self.vehicle.enter_guided()
+            self._holds.clear()
             await self.happen(Event.RESUME, "the operator asked")
         elif command == "return":
             self.why_stopped = self.why_stopped or "the operator asked to return"
@@ -157,7 +153,9 @@ class Mission:
         elif command == "abort":
             self.why_stopped = "the operator aborted the run"
             await self.happen(Event.ABORT, "the operator asked")
-        return self.state.value
+
+    def _may_move(self) -> bool:
+        return self.state in MAY_MOVE
 
     def flight_time(self) -> float:
         """Seconds in the air so far."""
@@ -167,14 +165,18 @@ class Mission:
         """Where the aircraft goes from here as decided: its waypoint and the path beyond; empty when it does not."""
         if self.state not in FLYING:
             return []
-        return [self._here(), *(self._latlon(cell) for cell in (self._navigator.waypoint, *self.path))]
+        return [
+            self.helm.here(),
+            *(self.helm.latlon(cell) for cell in (self._navigator.waypoint, *self.path)),
+        ]
 
     # ---- phases ------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
         """Fly the whole mission; returns when the state is final."""
         async with self._group as group:
-            watchers = [group.create_task(self._watch()), group.create_task(self._keep_track())]
+            jobs = (self._watch(), self._guard(), self._keep_track())
+            watchers = [group.create_task(job) for job in jobs]
             try:
                 await self._get_ready()
                 while self.state not in FINAL:
@@ -188,13 +190,13 @@ class Mission:
         patience = self.settings.link.connect_timeout_s
         await self.vehicle.connect(patience)
         await self.vehicle.wait_until(lambda t: t.landed_state != "undefined", patience)
-        self._altitude_m = self.vehicle.telemetry.home_alt_amsl_m + self.settings.flight.altitude_m
+        self.helm.altitude_m = self.vehicle.telemetry.home_alt_amsl_m + self.settings.flight.altitude_m
         await self.happen(Event.LINKED, f"{self.vehicle.telemetry.autopilot} is ready")
-        if self.may_take_off and self._on_ground():
+        if self.may_take_off and self.helm.on_ground():
             await self._take_off()
         else:
             log.info("take off and select the guided mode: the search starts when the aircraft hovers in it")
-            while self.state == State.READY and not self._hovering():
+            while self.state == State.READY and not self.helm.hovering():
                 await self.clock.sleep(TICK_S)
             if self.state == State.READY:
                 await self.vehicle.enter_guided()
@@ -206,10 +208,16 @@ class Mission:
         await self.happen(Event.CLIMB, f"taking off to {height:.0f} m")
         await self._write("command", {"command": "take off", "height_m": height})
         self.flight.began = self.clock.now()
-        await self.vehicle.enter_guided()
-        await self.vehicle.arm()
-        await self.vehicle.take_off(height)
-        await self.happen(Event.AIRBORNE, f"at {height:.0f} m")
+        try:
+            await self.vehicle.enter_guided()
+            await self.vehicle.arm()
+            await self.vehicle.take_off(height)
+            await self.happen(Event.AIRBORNE, f"at {height:.0f} m")
+        except LinkError as error:
+            await self.clock.sleep(RETRY_S)  # what the pilot did is told by an event of its own
+            if self.state == State.TAKEOFF:
+                raise
+            log.warning("%s", error)
 
     async def _phase(self) -> None:
         """Do what the state asks for until the state changes."""
@@ -230,12 +238,12 @@ class Mission:
         if not self.flight.began:
             self.flight.began = self.clock.now()
         await self._command(self.vehicle.set_speed(self.settings.flight.speed_mps), "speed")
-        here, inside = self._cell()
+        here, inside = self.helm.cell()
         start = self.search.nearest_flyable(here)
         if not inside or start != here:
             await self._fly_route(start)
         self.intake.last_at = self.clock.now()
-        self._navigator.interrupt(start, self._heading())
+        self._navigator.interrupt(start, self.helm.heading())
         while self.state in FLYING:
             await self._look_for_the_end()
             if self.state in FLYING:
@@ -246,7 +254,7 @@ class Mission:
         """Found, searched enough, too little energy, or nobody looking?"""
         settings, place = self.settings, self.search.place
         if place.probability >= settings.search.found_at and self.search.was_hit(place):
-            self.found = self._locate_target(place)
+            self.found = Found.at(self.frame, place)
             await self._write("found", vars(self.found))
             lat, lon = self.found.lat, self.found.lon
             await self.happen(Event.CONFIRMED, f"found at {lat:.6f}, {lon:.6f}, p = {place.probability:.4f}")
@@ -270,21 +278,25 @@ class Mission:
             await self.hold("detector", "the detector is silent")
 
     async def _wait_out_the_hold(self) -> None:
-        """Hover until the cause is gone, an operator decides, or the energy is needed for the way home."""
+        """Hover until the cause is gone, an operator decides, or it is time to fly home."""
         while self.state == State.HOLDING:
             if "detector" in self._holds and not self._detector_silent():
                 await self.release("detector", "the detector reports again")
-            elif "link" in self._holds and self._autopilot_heard():
+            elif "link" in self._holds and self.helm.heard():
                 await self.release("link", "the autopilot is heard again")
-            elif why := self._energy_low():
+            elif "position" in self._holds and not self.helm.doubts():
+                await self.release("position", "the position is good again")
+            elif not self._holds & BLIND and (why := self._energy_low()):
+                self._direct = self._homeward
                 self.why_stopped = why
                 await self._stop_searching(Event.ENERGY_LOW)
+            elif not self._holds & {*BLIND, "operator"} and (
+                why := hold_objection(self.clock.now() - self._held_since, self.settings.flight)
+            ):
+                self._direct = self._homeward
+                self.why_stopped = self.why_stopped or why
+                await self.happen(Event.RETURN, why)
             await self._tick()
-
-    def _autopilot_heard(self) -> bool:
-        """A heartbeat has come lately."""
-        age = self.clock.now() - self.vehicle.telemetry.heartbeat_time
-        return age < self.vehicle.settings.heartbeat_fresh_s
 
     def _detector_silent(self) -> bool:
         """No report for too long; never shorter than what a busy host may need in wall time."""
@@ -293,11 +305,7 @@ class Mission:
 
     def _energy_low(self) -> str:
         """Why the aircraft must fly home now, or nothing."""
-        battery = self.vehicle.telemetry.battery_percent
-        flown = self.flight_time()
-        if battery is not None and battery <= self.settings.flight.min_battery_percent:
-            return f"battery at {battery:.0f} %"
-        return f"{flown:.0f} s in the air" if flown >= self.settings.flight.max_flight_s else ""
+        return energy_objection(self.vehicle.telemetry, self.flight_time(), self.settings.flight)
 
     async def _stop_searching(self, event: Event) -> None:
         self.searched = True
@@ -306,30 +314,33 @@ class Mission:
     async def _steer(self) -> None:
         """One tick: note progress, think when it is time, send the next waypoint when it is due."""
         navigator, telemetry = self._navigator, self.vehicle.telemetry
-        here, inside = self._cell()
+        here, inside = self.helm.cell()
         if inside and here != self._last_cell:
             self.flight.steps += self._last_cell is not None
             self._last_cell = here
             navigator.entered(here)
         speed = telemetry.ground_speed_mps
-        remaining = self._metres_to(navigator.waypoint)
+        remaining = self.helm.metres_to(navigator.waypoint)
         if self._thinking is not None and self._thinking.done():
             decision, self._thinking = self._thinking.result(), None
             navigator.decide(decision.path)
             await self._decided(decision)
         thinking_s = self.settings.search.deadline_s * self.clock.speedup
         if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
+            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes.verdict]
             self._thinking = asyncio.create_task(
-                self.search.decide(navigator.waypoint, navigator.heading, self._unseen(navigator.ahead))
+                self.search.decide(navigator.waypoint, navigator.heading, unseen)
             )
             self._thinking.add_done_callback(lambda _: self._wake.set())
         target = navigator.due(remaining, speed)
-        if target is not None:
-            await self._send(self._latlon(target))
-            if self._hit_at is not None:
-                self.flight.latencies_s.append(time.perf_counter() - self._hit_at)
-                self._sent(self.flight.latencies_s[-1])
-                self._hit_at = None
+        if self._resend or (target is not None and not await self._send(self.helm.latlon(target))):
+            await self.clock.sleep(RETRY_S)
+            self._resend = False
+            navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
+        elif target is not None and self._hit_at is not None:
+            self.flight.latencies_s.append(time.perf_counter() - self._hit_at)
+            self._sent(self.flight.latencies_s[-1])
+            self._hit_at = None
 
     def observed(self, observation: Observation, arrived: float) -> None:
         """An observation was applied (called by the intake): a hit asks for a new decision at once."""
@@ -339,8 +350,8 @@ class Mission:
             self.flight.hits.append((float(lat), float(lon)))
         if self.state in FLYING:
             self._drop_thought()
-            here, _ = self._cell()
-            self._navigator.interrupt(self.search.nearest_flyable(here), self._heading())
+            here, _ = self.helm.cell()
+            self._navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
             self._hit_at = arrived
             self._wake.set()
 
@@ -348,93 +359,112 @@ class Mission:
 
     async def _go_home(self) -> None:
         """Fly home around what must not be flown over, then let the autopilot land."""
-        here = self._here()
-        route = way_home(self.search.grid, here, self.search.grid.launch)
-        for point in route[:-1]:
-            if not await self._fly_to(point):
-                return
+        if self.vehicle.telemetry.guided and not self._direct:
+            for point in self.helm.route(self.search.grid.launch)[:-1]:
+                if not await self._fly_to(point):
+                    return
         await self._command(self.vehicle.return_to_launch(), "return to launch")
         while self.state == State.RETURNING:
             if not self.vehicle.telemetry.armed:
-                self.flight.ended = self.clock.now()
                 await self.happen(Event.LANDED, "on the ground, disarmed")
             else:
                 await self.clock.sleep(TICK_S)
 
     async def _fly_route(self, goal: Cell) -> None:
         """Fly to a cell around what must not be flown over; ends early when the state changes."""
-        for point in way_home(self.search.grid, self._here(), self._latlon(goal)):
+        for point in self.helm.route(self.helm.latlon(goal)):
             if not await self._fly_to(point):
                 return
 
     async def _fly_to(self, point: LatLon) -> bool:
         """Fly straight to a point; False when the state changed on the way."""
         state = self.state
-        await self._send(point)
+        sent = await self._send(point)
         while self.state == state:
-            if self._distance(self._here(), point) <= self.settings.flight.corner_m:
+            if self.helm.distance(self.helm.here(), point) <= self.settings.flight.corner_m:
                 return True
+            if not sent or self._resend:
+                await self.clock.sleep(RETRY_S)
+                self._resend = False
+                sent = self.state == state and await self._send(point)
             await self._tick()
         return False
 
     # ---- watching the vehicle ----------------------------------------------------------------------------
 
+    async def _guard(self) -> None:
+        """Ten times a second: can the position be trusted, is the waypoint flown, is there too much wind?"""
+        while True:
+            trouble = self.helm.trouble(moving=self.state in MOVING)
+            if trouble is not None and self.state in (*MOVING, State.HOLDING):
+                await self.hold(trouble.cause, trouble.reason)
+            if self.state in FLYING and (windy := self.helm.too_windy()):
+                self.why_stopped = windy
+                await self.happen(Event.RETURN, windy)
+            await self.clock.sleep(TICK_S)
+
     async def _watch(self) -> None:
         """What the vehicle does by itself: the pilot's mode changes, a lost link, landing."""
+        stalled_at = 0.0
         async for event in self.vehicle.events():
             if isinstance(event, ModeChanged):
                 await self._write("mode", {"mode": event.mode, "commanded": event.commanded})
-                if not event.commanded and not event.guided:
-                    await self.happen(Event.PILOT, f"the pilot or the autopilot selected {event.mode}")
+            elif isinstance(event, Stalled):
+                stalled_at, self._resend = event.time, True
             elif isinstance(event, TargetNotTaken):
                 await self._write("not taken", {"lat": event.target.lat, "lon": event.target.lon})
-                cause = "target" if self._autopilot_heard() else "link"
-                await self.hold(cause, f"the waypoint is not flown: {event.reason}")
+                if event.time != stalled_at:  # given up because we stood still: it is sent again
+                    await self._not_taken(event)
+            elif isinstance(event, TargetTaken):
+                self._refused = 0
             elif isinstance(event, LinkLost):
                 await self.hold("link", "the autopilot is silent")
-            if self.state in (State.YIELDED, State.HOLDING) and self._on_ground():
-                self.why_stopped = self.why_stopped or "landed before the search was over"
+            why = self._takeovers.read(event, landing=self.state == State.RETURNING)
+            if why and not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
+                self.why_here += f"; {why}"
+                await self._write("yielded", {"reason": why})
+            if self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
+                why = f"landed before the search was over: {self.why_here}"
+                said = self._takeovers.said()  # often told only after the mode has changed
+                self.why_stopped = self.why_stopped or why + (said if said not in why else "")
                 await self.happen(Event.LANDED, "on the ground, disarmed")
+
+    async def _not_taken(self, event: TargetNotTaken) -> None:
+        """The autopilot does not fly to the waypoint: hold, for what that is most likely due to.
+
+        On a bad radio a waypoint may get lost as often as it is repeated, so another one is tried first.
+        """
+        self._refused += 1
+        if self.state not in MOVING:
+            log.warning("the stop is not flown: %s", event.reason)
+        elif not self.helm.heard():
+            await self.hold("link", "the autopilot is silent")
+        elif doubts := self.helm.doubts():
+            await self.hold("position", "; ".join(doubts))
+        elif self._refused < REFUSALS:
+            self._resend = True
+        else:
+            await self.hold("target", f"the waypoint is not flown: {event.reason}")
 
     async def _keep_track(self) -> None:
         """The track, once a second."""
         while True:
-            telemetry = self.vehicle.telemetry
-            if telemetry.armed and telemetry.position_known and not self._on_ground():
-                self.flight.track.append(
-                    (self.clock.now(), telemetry.lat, telemetry.lon, telemetry.alt_home_m)
-                )
+            if not self.helm.on_ground():
+                self.flight.record(self.vehicle.telemetry, self.clock.now())
             await self.clock.sleep(1.0)
 
     # ---- commands ----------------------------------------------------------------------------------------
 
-    async def _send(self, point: LatLon) -> None:
-        """Send the aircraft to a point: the one place where a waypoint leaves, after every check."""
-        if self.state not in MAY_MOVE:
-            log.warning("not sent in state %s: waypoint %.6f, %.6f", self.state, *point)
-            return
-        objection = self._objection(point)
-        if objection:
-            await self.hold("limits", f"the waypoint {point[0]:.6f}, {point[1]:.6f} {objection}")
-            return
-        body = {"command": "reposition", "lat": point[0], "lon": point[1], "alt_amsl_m": self._altitude_m}
-        await self._write("command", body)
-        if self.state not in MAY_MOVE:  # it changed while the command was written
-            return
-        try:
-            self.vehicle.reposition(point[0], point[1], self._altitude_m)
+    async def _send(self, point: LatLon) -> bool:
+        """Send the aircraft to a point; hold when something speaks against it. False when it was not sent."""
+        refusal = await self.helm.send(point)
+        if refusal is None:
             self.flight.waypoints += 1
-        except LinkError as error:
-            log.warning("waypoint not sent: %s", error)
-
-    def _objection(self, point: LatLon) -> str:
-        """Why a waypoint must not be flown to from here, or nothing."""
-        if not leg_is_clear(self.search.grid, self._here(), point):
-            return "lies behind an excluded area"
-        limit = self.settings.flight.max_launch_distance_m
-        if self._distance(self.search.grid.launch, point) > limit:
-            return f"is more than {limit:g} m from the launch point"
-        return ""
+        elif refusal.cause in ("position", "limits"):
+            await self.hold(refusal.cause, refusal.reason)
+        else:
+            log.warning("waypoint not sent: %s", refusal.reason)
+        return refusal is None
 
     async def _command(self, action: Awaitable[object], name: str) -> None:
         """Carry out a command that is not a waypoint; a refusal is told, not fatal."""
@@ -468,44 +498,3 @@ class Mission:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(TICK_S / self.clock.speedup):
                 await self._wake.wait()
-
-    # ---- where things are --------------------------------------------------------------------------------
-
-    def _here(self) -> LatLon:
-        telemetry = self.vehicle.telemetry
-        return telemetry.lat, telemetry.lon
-
-    def _cell(self) -> tuple[Cell, bool]:
-        """The cell under the aircraft (the nearest one when it is off the grid), and whether it is on it."""
-        cells, inside = self.frame.locate(np.array([self._here()]))
-        return (int(cells[0, 0]), int(cells[0, 1])), bool(inside[0])
-
-    def _heading(self) -> str:
-        return grid_heading(self.vehicle.telemetry.heading_deg, self.frame.bearing_deg)
-
-    def _latlon(self, cell: Cell) -> LatLon:
-        lat, lon = self.frame.to_latlon(np.array([cell]))[0]
-        return float(lat), float(lon)
-
-    def _distance(self, here: LatLon, there: LatLon) -> float:
-        (east, south), (east2, south2) = self.frame.to_metres(np.array([here, there]))
-        return math.hypot(east2 - east, south2 - south)
-
-    def _metres_to(self, cell: Cell) -> float:
-        return self._distance(self._here(), self._latlon(cell))
-
-    def _unseen(self, cells: tuple[Cell, ...]) -> list[Cell]:
-        """Those of `cells` that have not been looked at in this pass."""
-        return [cell for cell in cells if cell not in self.intake.passes.verdict]
-
-    def _hovering(self) -> bool:
-        telemetry = self.vehicle.telemetry
-        return telemetry.landed_state == "in_air" and telemetry.guided and telemetry.armed
-
-    def _on_ground(self) -> bool:
-        return not self.vehicle.telemetry.armed and self.vehicle.telemetry.landed_state == "on_ground"
-
-    def _locate_target(self, place: Place) -> Found:
-        lat, lon = self.frame.to_latlon(np.array([place.centroid]))[0]
-        sigma = math.sqrt(float(np.linalg.eigvalsh(place.covariance)[-1])) * self.frame.cell_m
-        return Found(float(lat), float(lon), place.probability, sigma)

@@ -212,7 +212,7 @@ class Service:
 
         def pose_at(moment: float) -> Pose | None:
             pose = vehicle.pose_at(moment)
-            if pose is None:
+            if pose is None or not mission.helm.trust.trusted_at(moment):
                 return None
             return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment)
 

@@ -94,3 +94,18 @@ TABLE: dict[tuple[State, Event], State] = {
 def next_state(state: State, event: Event) -> State:
     """The state that `event` leads to from `state`; the same state where the table has no entry."""
     return TABLE.get((state, event), state)
+
+
+def diagram() -> str:
+    """The table as a Mermaid state diagram, one arrow for each pair of states with all that leads along it."""
+    arrows: dict[tuple[State, State], list[Event]] = {}
+    for (state, event), to in TABLE.items():
+        if event != Event.ABORT:
+            arrows.setdefault((state, to), []).append(event)
+    lines = ["stateDiagram-v2", f"    [*] --> {State.WAITING}"]
+    for state in State:
+        for to in State:
+            if (state, to) in arrows:
+                lines.append(f"    {state} --> {to}: {', '.join(arrows[state, to])}")
+    lines += [f"    {state} --> [*]" for state in State if state in FINAL]
+    return "\n".join(lines) + "\n"

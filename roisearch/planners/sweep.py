@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from roisearch.belief import Belief
 from roisearch.decision import Decision, Effort, SearchState, action_name
-from roisearch.fov import HEADINGS, FieldOfView, heading_index
+from roisearch.fov import HEADINGS, MOVES, FieldOfView, heading_index
 from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
 from roisearch.planners.base import Progress, Scene, World
+from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions, segment_regions
 
 ROLLOUT_BALANCES = ((0.4, 1.0), (0.33, 1.0), (0.45, 1.0), (0.4, 2.0), (0.4, 0.3), (0.5, 2.0))
@@ -408,13 +409,32 @@ class SweepPlanner:
         )
 
     def warm_up(self, progress: Progress | None = None) -> None:
-        """Compile every kernel that a decision and an observation use, on a tiny map."""
-        from roisearch.planners.warm import warm_up
+        """Compile every kernel that a decision and an observation use, on a small map."""
 
-        def make(ground: NDArray[np.bool_]) -> SweepPlanner:
-            return SweepPlanner(self.settings, name=self.name, fov=self._fov, flyable=ground)
+        def make(flyable: NDArray[np.bool_]) -> SweepPlanner:
+            settings = replace(self.settings, iterations=1, horizon=64)
+            planner = SweepPlanner(settings, name=self.name, fov=self._fov, flyable=flyable)
+            planner._exercise(flyable.shape)
+            return planner
 
         warm_up(make, self._fov, progress)
+
+    def _exercise(self, shape: tuple[int, ...]) -> None:
+        """Use what two decisions may not: looks without a hit, and carrying the plan on."""
+        belief = Belief(1.0 + np.indices(shape).sum(axis=0))
+        state, rng = SearchState((0, 0)), np.random.default_rng(0)
+        for _ in range(2):
+            cell = self.plan(belief, state, rng).path[0]
+            heading = next(
+                name for name, (down, right) in zip(HEADINGS, MOVES, strict=True)
+                if (state.cell[0] + down, state.cell[1] + right) == cell
+            )  # fmt: skip
+            state = SearchState(cell, heading)
+            belief.observe([cell], False, 0.9, 0.9)
+        self.plan(belief, state, rng)
+        plans.extend(
+            *self._pose, self._chart, self._tree, self._rules, self._labels, self._home, 80, self._wave
+        )
 
 
 def remark(unreachable: float) -> str:

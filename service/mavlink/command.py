@@ -37,6 +37,8 @@ class Command:
     params: tuple[float, ...] = ()
     motion: bool = False
     goal_mode: str | None = None
+    goal_armed: bool | None = None
+    """What the heartbeat shows once it has done its work, as with `goal_mode`."""
     acked_twice: bool = False
     attempts: int | None = None
     """How often it is sent at most; None: as often as the link's settings say."""
@@ -153,6 +155,14 @@ class CommandBook:
         done: list[CommandDone] = []
         for lane in self._lanes.values():
             if lane.active is not None and lane.active.command.goal_mode == mode:
+                done += self._end(lane, Accepted(), now)
+        return done
+
+    def on_armed(self, armed: bool, now: float) -> list[CommandDone]:
+        """A heartbeat shows the motors armed or not: a command that asked for it has done its work."""
+        done: list[CommandDone] = []
+        for lane in self._lanes.values():
+            if lane.active is not None and lane.active.command.goal_armed == armed:
                 done += self._end(lane, Accepted(), now)
         return done
 

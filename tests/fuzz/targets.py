@@ -10,7 +10,7 @@ import asyncio
 import atexit
 import json
 import tempfile
-import tomllib
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -133,8 +133,10 @@ def _look_from(core: LinkCore, now: float) -> None:
 def fuzz_area(data: bytes) -> None:
     """Whatever is in an area file."""
     try:
-        area = parse_area(data, source="fuzz")
-        grid = build_grid(area, 20.0, max_cells=20_000)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # a division by zero, even if it ends well
+            area = parse_area(data, source="fuzz")
+            grid = build_grid(area, 20.0, max_cells=20_000)
     except BadInput as error:
         assert_sentence(error)
         return
@@ -167,8 +169,6 @@ def fuzz_settings(data: bytes) -> None:
                 parse_url(settings.link.connect)
         except BadInput as error:
             assert_sentence(error)
-        else:
-            tomllib.loads(data.decode("utf-8"))
 
 
 # ---- detector reports

@@ -98,6 +98,7 @@ def test_any_content_of_good_frames_is_survived(data: bytes) -> None:
 @given(data=st.binary(max_size=300) | ANY_JSON.map(as_bytes))
 @example(data=b"[" * 100_000)
 @example(data=b'{"type": "Polygon", "coordinates": ' + b"1" * 5000 + b"}")
+@example(data=b'{"type": "\\ud800"}')
 def test_any_bytes_as_an_area_file_are_answered_in_a_sentence(data: bytes) -> None:
     fuzz_area(data)
 

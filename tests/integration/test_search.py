@@ -19,7 +19,7 @@ import pytest
 from service.journal import read_rows
 from tests.integration.flight import FIELD, REPOSITORY, only_report, running, service_words, write_area
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = pytest.mark.timeout(600)
 FLAVORS = ("px4", "ardupilot")
 
 

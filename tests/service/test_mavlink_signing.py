@@ -43,8 +43,8 @@ def let_sign(mav: Any, key: bytes = KEY, timestamp: int = NOW, link_id: int = 3)
 def signed_rig(key: bytes = KEY) -> Rig:
     """A core with our key and a peer that signs with another copy of it, or with another key."""
     rig = Rig(signing_key=KEY)
-    assert rig.core.signer is not None
-    rig.core.signer.advance(NOW)
+    assert rig.core.codec.signer is not None
+    rig.core.codec.signer.advance(NOW)
     let_sign(rig.peer.mav, key)
     let_sign(rig._reader, key)
     return rig
@@ -78,7 +78,7 @@ def test_every_command_of_a_signed_flight_is_accepted_by_a_signing_autopilot() -
     rig.core.reposition(47.0, 8.0, 520.0, rig.now)
     assert rig.messages("COMMAND_INT", mavlink.MAV_CMD_DO_REPOSITION)
     assert all(message.get_signed() for message in rig.sent)
-    assert rig.core.frames_refused == 0
+    assert rig.core.codec.refused == 0
 
 
 def timestamp_of(frame: bytes) -> int:
@@ -134,7 +134,7 @@ def test_who_has_not_our_key_is_never_paired_with(kind: str) -> None:
         frame = bytes(message.pack(rig.peer.mav, force_mavlink1=True))
     assert rig.say(frame) == []
     assert not rig.core.paired
-    assert (rig.core.frames_refused, rig.core.messages_received) == (1, 0)
+    assert (rig.core.codec.refused, rig.core.messages_received) == (1, 0)
 
 
 def test_a_forged_mode_change_of_the_paired_vehicle_changes_nothing() -> None:
@@ -216,7 +216,7 @@ def test_a_radio_needs_no_signature_and_is_never_taken_for_the_vehicle() -> None
     rig.say(rig.peer.heartbeat(), source="vehicle")
     rig.now += 10.0
     rig.say(status, source="radio")
-    assert rig.core.frames_refused == 0
+    assert rig.core.codec.refused == 0
     assert rig.core.destination == "vehicle"
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from service.states import FINAL, MAY_MOVE, TABLE, Event, State, next_state
+from service.states import FINAL, MAY_MOVE, TABLE, Event, State, diagram, next_state
 
 
 def test_an_event_that_is_not_in_the_table_changes_nothing() -> None:
@@ -38,3 +40,19 @@ def test_every_state_can_be_reached_and_every_unfinished_one_left() -> None:
 def test_abort_ends_every_unfinished_state() -> None:
     for state in set(State) - FINAL:
         assert next_state(state, Event.ABORT) == State.ABORTED
+
+
+def test_the_readme_shows_the_diagram_of_the_table() -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    section = readme.split("## How a mission goes")[1].split("\n## ")[0]
+    assert section.split("```mermaid\n")[1].split("```")[0] == diagram()
+
+
+def test_the_diagram_has_an_arrow_for_every_entry_of_the_table_but_abort() -> None:
+    arrows = {}
+    for line in diagram().splitlines():
+        if ": " in line:
+            pair, events = line.strip().split(": ")
+            state, to = pair.split(" --> ")
+            arrows.update({(state, event): to for event in events.split(", ")})
+    assert arrows == {pair: to for pair, to in TABLE.items() if pair[1] != Event.ABORT}

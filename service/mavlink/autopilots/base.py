@@ -81,7 +81,9 @@ class Autopilot(ABC):
 
     def arm(self) -> Command:
         """MAV_CMD_COMPONENT_ARM_DISARM, never forced."""
-        return Command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,), motion=True, label="arm")
+        return Command(
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,), motion=True, goal_armed=True, label="arm"
+        )
 
     def return_to_launch(self) -> Command:
         """MAV_CMD_NAV_RETURN_TO_LAUNCH."""

@@ -1,0 +1,197 @@
+"""The helm: where the aircraft is, and the one place where a waypoint leaves for it, after every check."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from service.area import Grid, leg_is_clear, way_home
+from service.clock import Clock
+from service.config import Settings
+from service.errors import BadInput
+from service.evidence import grid_heading
+from service.flight import LatLon
+from service.limits import Lasting, PositionTrust, Progress, wind_objection
+from service.mavlink import LinkError, Vehicle
+from service.navigator import Cell
+
+log = logging.getLogger("roisearch")
+LEAST_PATIENCE_WALL_S = 1.5
+WINDY_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class NotSent:
+    """Why something was not sent; `cause` is what must pass first: "position", "limits", "link" or "state"."""
+
+    cause: str
+    reason: str
+
+
+class Helm:
+    """Sends waypoints and holds for one mission.
+
+    Args:
+        may_move: whether the mission's state allows motion now; asked again right before sending.
+        write: writes a row to the journal and returns once it is on disk.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        clock: Clock,
+        grid: Grid,
+        vehicle: Vehicle,
+        *,
+        may_move: Callable[[], bool],
+        write: Callable[[str, Mapping[str, object]], Awaitable[None]],
+    ) -> None:
+        self.settings, self.clock, self.grid, self.vehicle = settings, clock, grid, vehicle
+        self.frame = grid.frame
+        self.altitude_m = 0.0  # of every waypoint, above sea level; known once home is
+        flight = settings.flight
+        self.trust = PositionTrust(flight, vehicle.settings.position_fresh_s)
+        patience = max(flight.stuck_after_s, LEAST_PATIENCE_WALL_S * clock.speedup)
+        self._progress = Progress(patience, max(flight.corner_m, 0.3 * self.frame.cell_m))
+        self._windy = Lasting(WINDY_S)
+        self._target: LatLon | None = None
+        self._may_move, self._write = may_move, write
+
+    # ---- sending -----------------------------------------------------------------------------------------
+
+    async def send(self, point: LatLon) -> NotSent | None:
+        """Send the aircraft to a point, if nothing speaks against it; else says what does."""
+        if (objection := self.objection(point)) is not None:
+            return objection
+        body = {"command": "reposition", "lat": point[0], "lon": point[1], "alt_amsl_m": self.altitude_m}
+        await self._write("command", body)
+        if (objection := self.objection(point)) is not None:  # something happened while the row was written
+            return objection
+        try:
+            self.vehicle.reposition(point[0], point[1], self.altitude_m)
+        except LinkError as error:
+            return NotSent("link", str(error))
+        if self._target is None or self.distance(self._target, point) > 1.0:
+            self._progress.clear()
+        self._target = point
+        return None
+
+    async def hover(self) -> NotSent | None:
+        """Stop here. A stop is a waypoint too: none is sent while the position is not trusted."""
+        self.rest()
+        if doubts := self.doubts():
+            return NotSent("position", "; ".join(doubts))
+        await self._write("command", {"command": "hold"})
+        try:
+            self.vehicle.hold()
+        except LinkError as error:
+            return NotSent("link", str(error))
+        return None
+
+    def rest(self) -> None:
+        """No waypoint is being flown any more."""
+        self._target = None
+        self._progress.clear()
+
+    # ---- checks ------------------------------------------------------------------------------------------
+
+    def doubts(self) -> list[str]:
+        """Why the position is not to be trusted now."""
+        return self.trust.update(self.vehicle.telemetry, self.clock.now())
+
+    def objection(self, point: LatLon) -> NotSent | None:
+        """Why a waypoint must not be sent now, or nothing."""
+        if not self._may_move():
+            return NotSent("state", "the mission is not to move the aircraft")
+        if doubts := self.doubts():
+            return NotSent("position", "; ".join(doubts))
+        where = f"the waypoint {point[0]:.6f}, {point[1]:.6f}"
+        if not self._leg_allowed(point):
+            return NotSent("limits", f"{where} lies behind an excluded area")
+        limit = self.settings.flight.max_launch_distance_m
+        if self.distance(self.grid.launch, point) > limit:
+            return NotSent("limits", f"{where} is more than {limit:g} m from the launch point")
+        return None
+
+    def _leg_allowed(self, point: LatLon) -> bool:
+        """Clear of every exclusion, or the straight way out of the one the aircraft has drifted into."""
+        here = self.here()
+        if leg_is_clear(self.grid, here, point):
+            return True
+        try:
+            return self.distance(way_home(self.grid, here, point)[0], point) < 1.0
+        except BadInput:  # there is no way at all
+            return False
+
+    def trouble(self, *, moving: bool) -> NotSent | None:
+        """What stands against flying on while the autopilot follows our waypoints, or nothing."""
+        doubts = self.doubts()
+        if not self.vehicle.telemetry.guided:
+            return None
+        if doubts:
+            return NotSent("position", "; ".join(doubts))
+        if moving and self._target is not None:
+            stuck = self._progress.stuck(self.distance(self.here(), self._target), self.clock.now())
+            return NotSent("progress", stuck) if stuck else None
+        return None
+
+    def too_windy(self) -> str:
+        """Why the wind is too much, once it has lasted, or nothing."""
+        objection = wind_objection(self.vehicle.telemetry, self.settings.flight)
+        return self._windy.after(objection, self.clock.now())
+
+    def route(self, goal: LatLon) -> list[LatLon]:
+        """The way from here to `goal` around the exclusions; straight there when they leave none."""
+        try:
+            return way_home(self.grid, self.here(), goal)
+        except BadInput as error:
+            log.warning("%s", error)
+            return [goal]
+
+    def heard(self) -> bool:
+        """A heartbeat has come lately."""
+        age = self.clock.now() - self.vehicle.telemetry.heartbeat_time
+        return age < self.vehicle.settings.heartbeat_fresh_s
+
+    # ---- where things are --------------------------------------------------------------------------------
+
+    def here(self) -> LatLon:
+        """The aircraft's position in degrees, as last told."""
+        telemetry = self.vehicle.telemetry
+        return telemetry.lat, telemetry.lon
+
+    def cell(self) -> tuple[Cell, bool]:
+        """The cell under the aircraft (the nearest one when it is off the grid), and whether it is on it."""
+        cells, inside = self.frame.locate(np.array([self.here()]))
+        return (int(cells[0, 0]), int(cells[0, 1])), bool(inside[0])
+
+    def heading(self) -> str:
+        """Where its nose points, in the grid's directions."""
+        return grid_heading(self.vehicle.telemetry.heading_deg, self.frame.bearing_deg)
+
+    def latlon(self, cell: Cell) -> LatLon:
+        """The centre of a cell in degrees."""
+        lat, lon = self.frame.to_latlon(np.array([cell]))[0]
+        return float(lat), float(lon)
+
+    def distance(self, here: LatLon, there: LatLon) -> float:
+        """Metres between two positions."""
+        (east, south), (east2, south2) = self.frame.to_metres(np.array([here, there]))
+        return math.hypot(east2 - east, south2 - south)
+
+    def metres_to(self, cell: Cell) -> float:
+        """Metres from the aircraft to the centre of a cell."""
+        return self.distance(self.here(), self.latlon(cell))
+
+    def hovering(self) -> bool:
+        """In the air, armed, in the guided mode."""
+        telemetry = self.vehicle.telemetry
+        return telemetry.landed_state == "in_air" and telemetry.guided and telemetry.armed
+
+    def on_ground(self) -> bool:
+        """On the ground with the motors off."""
+        return not self.vehicle.telemetry.armed and self.vehicle.telemetry.landed_state == "on_ground"

@@ -1,0 +1,170 @@
+"""What must hold for the aircraft to be sent anywhere: pure checks over what is known, and three small memories.
+
+A check returns reasons as sentences' ends; none means that it has no objection. The memories (`PositionTrust`,
+`Progress`, `Lasting`) are given the time, in seconds of the service's clock, and look at no clock themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from service.config import FlightSettings
+from service.mavlink.events import Target
+from service.mavlink.target import distance_m
+from service.mavlink.telemetry import Telemetry
+
+_METRES_PER_DEGREE = 111_194.93
+_FIX_3D = 3
+_MARGIN_S = 1.5  # the vehicle tells its health once a second: so long may it have been bad unnoticed
+_REMEMBERED = 100
+
+
+def position_objections(t: Telemetry, flight: FlightSettings, fresh_s: float) -> list[str]:
+    """Why the position must not be trusted now: GPS_RAW_INT, the estimator's status, the position's age.
+
+    The age is counted up to the last heartbeat: when that stays away too, the link is lost, and not the position.
+    `fresh_s` seconds is the most that it may be. `flight.min_satellites` of 0 asks for no GPS at all.
+    """
+    objections = []
+    age = t.heartbeat_time - t.position_time
+    if age > fresh_s:
+        objections.append(f"no new position for {age:.0f} s" if math.isfinite(age) else "no position")
+    if flight.min_satellites > 0:
+        if t.fix < _FIX_3D:
+            objections.append("the GPS has no 3D fix")
+        elif t.satellites is not None and t.satellites < flight.min_satellites:
+            objections.append(f"the GPS has {t.satellites} satellites, fewer than {flight.min_satellites}")
+    if t.estimator_ok is False:
+        objections.append("the autopilot's position estimate is not healthy")
+    return objections
+
+
+def energy_objection(t: Telemetry, flown_s: float, flight: FlightSettings) -> str:
+    """Why the aircraft must fly home now, or nothing; `flown_s` seconds it has been in the air."""
+    if t.battery_percent is not None and t.battery_percent <= flight.min_battery_percent:
+        return f"battery at {t.battery_percent:.0f} %"
+    return f"{flown_s:.0f} s in the air" if flown_s >= flight.max_flight_s else ""
+
+
+def hold_objection(held_s: float, flight: FlightSettings) -> str:
+    """Why hovering for a fault has to end after so many seconds, or nothing."""
+    return f"hovered for {held_s:.0f} s" if held_s > flight.max_hold_s else ""
+
+
+def wind_objection(t: Telemetry, flight: FlightSettings) -> str:
+    """Why the wind is too much, or nothing; an autopilot that does not tell the wind has none."""
+    if t.wind is None or t.wind.speed_mps <= flight.max_wind_mps:
+        return ""
+    return f"wind of {t.wind.speed_mps:.0f} m/s, more than {flight.max_wind_mps:g} m/s"
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A position with the vehicle's own time since boot (seconds); degrees and m/s."""
+
+    boot_s: float
+    lat: float
+    lon: float
+    north_mps: float
+    east_mps: float
+
+    @classmethod
+    def of(cls, t: Telemetry) -> Sample | None:
+        """The sample in a snapshot, if the vehicle has told one."""
+        if t.boot_time_s is None or not t.position_known:
+            return None
+        return cls(t.boot_time_s, t.lat, t.lon, t.velocity_ned_mps[0], t.velocity_ned_mps[1])
+
+
+def jump_m(before: Sample, after: Sample) -> float:
+    """Metres between where `after` is and where the speeds of both say it should be."""
+    seconds = after.boot_s - before.boot_s
+    north = 0.5 * (before.north_mps + after.north_mps) * seconds
+    east = 0.5 * (before.east_mps + after.east_mps) * seconds
+    narrowing = max(math.cos(math.radians(before.lat)), 1e-6)
+    lat = before.lat + north / _METRES_PER_DEGREE
+    lon = before.lon + east / (_METRES_PER_DEGREE * narrowing)
+    return distance_m(Target(lat, lon, 0.0), Target(after.lat, after.lon, 0.0))
+
+
+class PositionTrust:
+    """Whether the position may be trusted, and when it could not be.
+
+    A position that was doubted is trusted again once there was nothing to object to for `flight.settle_s`
+    seconds (the first time at once). A jump counts as an objection at its moment. `fresh_s`: see
+    `position_objections`.
+    """
+
+    def __init__(self, flight: FlightSettings, fresh_s: float) -> None:
+        self._flight, self._fresh_s = flight, fresh_s
+        self._last: Sample | None = None
+        self._was_good = False
+        self._well_since = math.inf
+        self._doubted: deque[tuple[float, float]] = deque(maxlen=_REMEMBERED)  # closed intervals of the clock
+        self.doubts: list[str] = []
+        """Why the position is not trusted now, as sentences' ends; empty: it is."""
+
+    def update(self, t: Telemetry, now: float) -> list[str]:
+        """Take a snapshot in; returns `doubts`."""
+        objections = position_objections(t, self._flight, self._fresh_s) + self._jumped(t)
+        if objections:
+            if not self.doubts:
+                self._doubted.append((now - _MARGIN_S, math.inf))
+            self.doubts, self._well_since = objections, math.inf
+        elif self.doubts:
+            self._well_since = min(self._well_since, now)
+            if now - self._well_since >= self._flight.settle_s or not self._was_good:
+                began, _ = self._doubted[-1]
+                self._doubted[-1] = (began, now)
+                self.doubts = []
+        self._was_good |= not self.doubts
+        return self.doubts
+
+    def trusted_at(self, time: float) -> bool:
+        """False when the position of that time was, or is now known to have been, doubtful."""
+        return not any(began <= time <= ended for began, ended in self._doubted)
+
+    def _jumped(self, t: Telemetry) -> list[str]:
+        before, after = self._last, Sample.of(t)
+        self._last = after
+        if before is None or after is None or after.boot_s <= before.boot_s:
+            return []
+        slack = 0.5 * self._flight.speed_mps * (after.boot_s - before.boot_s)
+        jump = jump_m(before, after)
+        return [f"the position jumped by {jump:.0f} m"] if jump > self._flight.max_jump_m + slack else []
+
+
+class Progress:
+    """Whether the aircraft comes nearer to its waypoint."""
+
+    def __init__(self, patience_s: float, near_m: float) -> None:
+        """No progress for `patience_s` seconds is too long; within `near_m` metres it has arrived."""
+        self._patience_s, self._near_m = patience_s, near_m
+        self.clear()
+
+    def clear(self) -> None:
+        """There is no waypoint, or a new one."""
+        self._best_m, self._since = math.inf, math.inf
+
+    def stuck(self, remaining_m: float, now: float) -> str:
+        """Take the distance to the waypoint in; says why the aircraft counts as stuck, or nothing."""
+        if remaining_m < self._best_m - 1.0 or remaining_m <= self._near_m or not math.isfinite(self._since):
+            self._best_m, self._since = min(self._best_m, remaining_m), now
+        waited = now - self._since
+        if waited <= self._patience_s:
+            return ""
+        return f"no progress towards the waypoint for {waited:.0f} s, it is {remaining_m:.0f} m away"
+
+
+class Lasting:
+    """An objection that counts only once it has lasted."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._since = seconds, math.inf
+
+    def after(self, objection: str, now: float) -> str:
+        """The objection once it has been there for so long without a break, else nothing."""
+        self._since = min(self._since, now) if objection else math.inf
+        return objection if now - self._since >= self._seconds else ""

@@ -1,0 +1,55 @@
+"""Energy, wind and the detector: what the service itself must notice."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from tests.integration.scene import flight
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def test_a_low_battery_flies_home_and_says_so(tmp_path: Path) -> None:
+    with flight(tmp_path) as scene:
+        scene.searching()
+        scene.control.fault("battery", percent=18.0)
+        scene.reaches("RETURNING", "battery at 18 %")
+        code, report = scene.ends()
+    assert code == 3
+    assert "battery" in report["stopped_because"]
+
+
+def test_a_wind_that_it_cannot_fly_against_is_noticed(tmp_path: Path) -> None:
+    with flight(tmp_path, "ardupilot") as scene:
+        scene.searching()
+        scene.control.fault("wind", east=-20.0)
+        scene.reaches("HOLDING", "no progress towards the waypoint")
+
+
+def test_a_wind_that_the_autopilot_tells_flies_home(tmp_path: Path) -> None:
+    with flight(tmp_path) as scene:
+        scene.searching()
+        scene.tap.say(mavlink.MAVLink_wind_cov_message(0, 10.0, 10.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        scene.reaches("RETURNING", "wind of 14 m/s")
+        code, report = scene.ends()
+    assert code == 4
+    assert "wind of 14 m/s" in report["stopped_because"]
+
+
+def test_a_silent_detector_clears_no_ground_and_the_search_comes_back_by_itself(tmp_path: Path) -> None:
+    with flight(tmp_path) as scene:
+        scene.searching()
+        os.kill(scene.detector.process.pid, signal.SIGSTOP)
+        scene.reaches("HOLDING", "the detector is silent")
+        before = scene.map()
+        scene.fly(30.0)
+        assert scene.map()["digest"] == before["digest"]
+        assert scene.state() == "HOLDING"
+        os.kill(scene.detector.process.pid, signal.SIGCONT)
+        scene.reaches("SEARCHING", "the detector reports again")
+        scene.moves_again()

@@ -1,0 +1,92 @@
+"""A position that is not to be trusted: nothing is sent, nothing is believed, and the search comes back by itself."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from tests.integration.scene import Scene, flight
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def test_a_short_loss_of_gps_holds_and_passes(tmp_path: Path) -> None:
+    with flight(tmp_path, speedup=4.0) as scene:
+        scene.searching()
+        scene.control.fault("gps_lost", seconds=2.5)
+        scene.reaches("HOLDING", "the GPS has no 3D fix")
+        before = len(scene.tap.motions)
+        scene.reaches("SEARCHING", "the position is good again")
+        row = scene.transitions()[-2]
+        assert row.body["to"] == "HOLDING"
+        sent = [name for at, name in scene.tap.motions[before:]]
+        assert sent == [] or sent[0] != "MAV_CMD_NAV_RETURN_TO_LAUNCH"
+        scene.moves_again()
+
+
+def test_a_jump_of_the_position_holds_and_what_is_reported_meanwhile_is_not_believed(tmp_path: Path) -> None:
+    with flight(tmp_path, settle_s=40.0) as scene:
+        scene.searching()
+        scene.control.fault("gps_jump", north=40.0)
+        scene.reaches("HOLDING", "the position jumped by")
+        before, refused = scene.map(), reports(scene)["refused"]
+        scene.sends_nothing(20.0)
+        assert scene.map()["digest"] == before["digest"]
+        assert reports(scene)["refused"] > refused
+        scene.reaches("SEARCHING", "the position is good again")
+        scene.moves_again()
+        wait_for_another_look(scene, before["digest"])
+
+
+def test_an_unhealthy_estimate_holds_and_passes(tmp_path: Path) -> None:
+    with flight(tmp_path, "ardupilot") as scene:
+        scene.searching()
+        scene.tap.say(mavlink.MAVLink_ekf_status_report_message(1 | 4 | 32 | 128, 2.0, 2.0, 0.1, 0.1, 0.0))
+        scene.reaches("HOLDING", "estimate is not healthy")
+        scene.reaches("SEARCHING", "the position is good again")
+        scene.moves_again()
+
+
+@pytest.mark.parametrize(
+    ("flavor", "kind", "mode"), [("px4", "gps_lost", "AUTO_LAND"), ("ardupilot", "ekf_bad", "LAND")]
+)
+def test_the_autopilots_own_landing_without_a_position_is_not_disturbed(
+    flavor: str, kind: str, mode: str, tmp_path: Path
+) -> None:
+    with flight(tmp_path, flavor) as scene:
+        scene.searching()
+        scene.control.fault(kind)
+        scene.reaches("YIELDED", f"selected {mode}")
+        motions = len(scene.tap.motions)
+        code, report = scene.ends()
+        assert scene.tap.motions[motions:] == []
+    assert code == 4
+    assert mode in report["stopped_because"]
+
+
+def test_a_search_goes_on_after_an_estimate_that_was_bad_for_a_while(tmp_path: Path) -> None:
+    with flight(tmp_path, "ardupilot") as scene:
+        scene.searching()
+        scene.control.fault("ekf_bad", seconds=3.0)
+        scene.reaches("YIELDED", "LAND")
+        deadline = time.monotonic() + 20.0
+        while scene.order("resume") != "SEARCHING":
+            assert time.monotonic() < deadline, scene.service.said
+        scene.moves_again()
+
+
+def reports(scene: Scene) -> dict[str, int]:
+    """How many reports were accepted and refused."""
+    counts: dict[str, int] = scene.door.get("/api/state").json()["reports"]
+    return counts
+
+
+def wait_for_another_look(scene: Scene, digest: str) -> None:
+    """Wait until the belief has changed: what is reported now is believed again."""
+    deadline = time.monotonic() + 60.0
+    while scene.map()["digest"] == digest:
+        assert time.monotonic() < deadline, scene.service.said
+        time.sleep(0.1)

@@ -11,6 +11,10 @@ from roisearch.fov import HEADINGS, heading_index
 
 Cell = tuple[int, int]
 
+AHEAD = 32
+"""The most cells that the path of an option tells when the option may be dropped before its end: what a
+decision costs must not grow with the distance."""
+
 
 @dataclass(frozen=True, slots=True)
 class SearchState:
@@ -46,13 +50,15 @@ class Decision:
     """The cells to enter next, and why.
 
     Attributes:
-        path: cells in order, each a neighbour of the last, the first a neighbour of the drone; never empty.
+        path: cells in order, each a neighbour of the last, the first a neighbour of the drone; never empty. Of a
+            long way, the first AHEAD cells.
         action: "north", "east", "south", "west", "region 3", "elsewhere" (outside all regions), or the
             pattern's name for a planner that follows one.
         value: what the planner expects of it, in its own measure; comparable within one planner only.
         effort: iterations and seconds.
         unreachable: probability of the cells that cannot be seen from where the drone can fly.
         remark: one sentence for the operator when something is worth saying, else empty.
+        goal: the cell that an option goes to look at; None for a single move or a pattern.
         options: the root's visits and value by action, [actions, 2]; see `alternatives`.
     """
 
@@ -62,6 +68,7 @@ class Decision:
     effort: Effort
     unreachable: float = 0.0
     remark: str = ""
+    goal: Cell | None = None
     options: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)), repr=False)
 
     @property

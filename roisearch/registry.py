@@ -13,6 +13,7 @@ from roisearch.planners.pattern import CoveragePlanner, SpiralPlanner
 from roisearch.planners.policies import DirectPolicySearch
 from roisearch.planners.puct import PuctPlanner
 from roisearch.planners.settings import settings_for
+from roisearch.planners.sweep import SweepPlanner, sweep_settings_for
 
 _SHARED = ("flyable", "regions")
 
@@ -20,6 +21,9 @@ _SHARED = ("flyable", "regions")
 def _puct(name: str) -> Callable[..., Planner]:
     def make(*, fov: FieldOfView, preset: str = "default", **options: Any) -> Planner:
         shared = {key: options.pop(key) for key in _SHARED if key in options}
+        if name == "puct-regions-lite" and preset == "default":
+            return SweepPlanner(sweep_settings_for(name, options), name=name, fov=fov, **shared)
+        preset = "default" if name == "puct-regions-lite" and preset == "trips" else preset
         return PuctPlanner(name, settings_for(name, preset, options), fov=fov, **shared)
 
     return make

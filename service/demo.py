@@ -24,9 +24,9 @@ GROUND_AMSL_M = 120.0
 
 @dataclass
 class World:
-    """The processes that stand in for the world, and where the target is (None: not in the area)."""
+    """The processes that stand in for the world, and where the target is."""
 
-    target: LatLon | None
+    target: LatLon
     url: str
     settings: Settings
     processes: list[asyncio.subprocess.Process] = field(default_factory=list)
@@ -37,7 +37,7 @@ class World:
         world = cls(draw(grid, settings.run.seed), "", settings)
         lat, lon = grid.launch
         demo = settings.demo
-        words = ["autopilot", "--flavor", demo.flavor, "--listen", "udpin://127.0.0.1:0"]
+        words = ["autopilot", "--attached", "--flavor", demo.flavor, "--listen", "udpin://127.0.0.1:0"]
         words += [f"--home={lat:.7f},{lon:.7f},{GROUND_AMSL_M:.0f}", "--speedup", f"{settings.speedup:g}"]
         words += ["--seed", str(settings.run.seed), "--endurance", f"{demo.endurance_min:g}"]
         process = await world.spawn(words)
@@ -52,7 +52,7 @@ class World:
     async def start_detector(self, service_url: str, token: str = "") -> None:
         """Start the detector, with a token if the door wants one; it ends by itself when the run is over."""
         sensor = self.settings.sensor
-        place = [f"--target={self.target[0]:.7f},{self.target[1]:.7f}"] if self.target else []
+        place = [f"--target={self.target[0]:.7f},{self.target[1]:.7f}"]
         chances = ["--p-tp", f"{sensor.p_tp}", "--p-tn", f"{sensor.p_tn}"]
         seed = ["--seed", str(self.settings.run.seed)]
         await self.spawn(["detector", "--service", service_url, *place, *chances, *seed], token)
@@ -96,13 +96,11 @@ class World:
             await process.wait()
 
 
-def draw(grid: Grid, seed: int) -> LatLon | None:
-    """A target drawn from the prior over the cells that the aircraft can get to; None: it is not in the area."""
+def draw(grid: Grid, seed: int) -> LatLon:
+    """A target drawn from the prior over the cells that the aircraft can get to: this world has something to find."""
     from sim.target import draw_target
 
     reachable = np.where(grid.flyable, grid.prior, 0.0)
-    where = draw_target(reachable / reachable.sum() * (1.0 - grid.outside), np.random.default_rng(seed))
-    if where is None:
-        return None
+    where = draw_target(reachable / reachable.sum(), np.random.default_rng(seed))
     lat, lon = grid.frame.to_latlon(np.array([where]) - 0.5)[0]
     return float(lat), float(lon)

@@ -6,6 +6,7 @@ replays the journal has the same belief to the last bit. A repeated id changes n
 
 from __future__ import annotations
 
+import asyncio
 import sqlite3
 import time
 from collections.abc import Callable
@@ -42,10 +43,13 @@ class Intake:
     refused: int = 0
     last_at: float = 0.0
     _ids: set[str] = field(default_factory=set)
+    _pending: dict[str, asyncio.Event] = field(default_factory=dict)
 
     async def submit(self, report: Report) -> Receipt:
         """Take one report in. Raises JournalLost when it could not be written."""
         arrived = time.perf_counter()
+        while report.id in self._pending:  # the same report again, before the first is on disk
+            await self._pending[report.id].wait()
         if report.id in self._ids:
             return Receipt(id=report.id, status="duplicate")
         pose = self._pose(report)
@@ -55,9 +59,10 @@ class Intake:
                 f"no position of the aircraft is known and trusted for captured_at {report.captured_at:.3f}"
             )
             return Receipt(id=report.id, status="refused", reason=reason)
-        self._ids.add(report.id)
+        written = self._pending[report.id] = asyncio.Event()
         footprint = self.sensor.footprint(pose)
         hits = self._hits(report, footprint)
+        passes_before = dict(self.passes.verdict)
         observation = observe(self.sensor, self.passes, footprint, hits) if report.usable else None
         body = {
             "report": report.model_dump(by_alias=True),
@@ -66,10 +71,15 @@ class Intake:
         }
         try:
             await self.journal.append(self.clock.now(), "report", body, key=f"report {report.id}")
+            self._ids.add(report.id)
         except Duplicate:
             return Receipt(id=report.id, status="duplicate")
         except (sqlite3.Error, OSError) as error:
+            self.passes.verdict = passes_before
             raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
+        finally:
+            del self._pending[report.id]
+            written.set()
         self.accepted += 1
         self.last_at = self.clock.now()
         if observation is None:

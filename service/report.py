@@ -88,17 +88,17 @@ def run_report(mission: Mission, area: str, settings: Settings, began: float) ->
     return report
 
 
-def simulated(world_target: LatLon | None, mission: Mission, settings: Settings) -> dict[str, Any]:
+def simulated(target: LatLon, mission: Mission, settings: Settings) -> dict[str, Any]:
     """What only a simulation can tell: where the target really was, and how far off the report is."""
     error = None
     frame = mission.frame
-    if world_target and mission.found:
-        metres = frame.to_metres(np.array([world_target, (mission.found.lat, mission.found.lon)]))
+    if mission.found:
+        metres = frame.to_metres(np.array([target, (mission.found.lat, mission.found.lon)]))
         error = float(np.hypot(*(metres[1] - metres[0])))
     return {
         "flavor": settings.demo.flavor,
         "speedup": settings.speedup,
-        "target": {"lat": world_target[0], "lon": world_target[1]} if world_target else None,
+        "target": {"lat": target[0], "lon": target[1]},
         "error_m": error,
         "error_cells": None if error is None else error / frame.cell_m,
     }

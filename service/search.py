@@ -96,7 +96,7 @@ class Search:
         """The decision in words: where to, how much is there, how far, and what else was weighed."""
         ranked = sorted(decision.alternatives, key=lambda option: -option.visits)
         options = tuple((option.action, option.visits, option.value) for option in ranked)
-        goal = decision.path[-1] if decision.path else cell
+        goal = decision.goal or decision.path[-1]
         label = int(self.regions.labels[goal])
         distance = self.distance(cell, goal)
         if label:

@@ -13,7 +13,6 @@ from service.config import Settings
 from service.evidence import Pose, Sensor
 from service.intake import Intake
 from service.mission import Mission
-from service.picture import Scene, draw_scene
 from service.reports import Receipt, Report
 from service.search import Search
 from service.states import FINAL, State
@@ -148,6 +147,8 @@ class RunView:
 
     def picture(self) -> bytes:
         """The map as a PNG."""
+        from service.picture import Scene, draw_scene  # matplotlib: not before somebody looks
+
         state, mission = self.state(), self.mission
         pose = state["pose"]
         found = mission.found if mission else None

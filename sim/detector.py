@@ -131,7 +131,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--p-tn", type=_probability, default=0.9, help="P(no report | not there) (default 0.9)"
     )
-    parser.add_argument("--rate", type=float, default=4.0, metavar="HZ", help="frames a second (default 4)")
+    parser.add_argument("--rate", type=float, default=2.0, metavar="HZ", help="frames a second (default 2)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--token-file", metavar="FILE", help="file with a token of the service (default: $ROISEARCH_TOKEN)"

@@ -14,6 +14,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from roisearch.decision import AHEAD
 from roisearch.fov import HEADINGS, FieldOfView
 from roisearch.planners.settings import PuctSettings
 from roisearch.regions import Regions
@@ -238,9 +239,9 @@ class TwinPlanner:
             row, col = STEPS[action]
             return HEADINGS[action], [(cell[0] + row, cell[1] + col)]
         region = self.regions[action - 4]
-        path = []
+        path: list[Cell] = []
         arrived = False
-        while not arrived:
+        while not arrived and len(path) < AHEAD:
             move, arrived = self._trip_move(cell, facing, region)
             cell, facing = (cell[0] + STEPS[move][0], cell[1] + STEPS[move][1]), move
             path.append(cell)

@@ -61,11 +61,11 @@ def follow_index(
     stack: Ints,
     scores: Floats,
     path: Ints,
-) -> tuple[int, int]:
-    """The region with the cell most worth its distance, and how many cells of `path` lead to a look at it.
+) -> tuple[int, int, int]:
+    """The region of the cell most worth its distance, that cell, and how many cells of `path` lead to it.
 
-    `scores` [regions] becomes each region's best weight * worth[steps]; (-1, 0) when there is nothing
-    anywhere.
+    `scores` [regions] becomes each region's best weight * worth[steps]; (-1, -1, 0) when there is
+    nothing anywhere.
     """
     land = Land(legal, weights.size // cols, cols)
     sight = Sight(offsets, gains, gains, is_point)
@@ -85,8 +85,8 @@ def follow_index(
         if there >= 0 and (best < 0 or scores[region] > scores[best]):
             best, goal = region, there
     if best < 0:
-        return -1, 0
-    return best, go_to(row, col, heading, goal, weights, land, sight, field, queue, path)
+        return -1, -1, 0
+    return best, goal, go_to(row, col, heading, goal, weights, land, sight, field, queue, path)
 
 
 @kernel

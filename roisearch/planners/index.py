@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from roisearch.belief import Belief
-from roisearch.decision import Decision, Effort, SearchState
+from roisearch.decision import AHEAD, Decision, Effort, SearchState
 from roisearch.fov import FieldOfView, heading_index
 from roisearch.kernels.onestep import follow_index
 from roisearch.planners.base import Progress, Scene, World, any_move, cells_of, remark_on
@@ -51,7 +51,7 @@ class IndexPlanner:
         cells, is_open, fov, forest = rows * cols, scene.ground.is_open, self._fov, scene.forest
         worth = np.ones(8 + (rows + cols if is_open else cells))
         worth[1:] = np.arange(1, worth.size, dtype=np.float64) ** (-1.0 / self._alpha)
-        self._path = np.zeros((2, rows + cols + 64), dtype=np.int64)
+        self._path = np.zeros((2, AHEAD), dtype=np.int64)
         self._scores = np.zeros(scene.regions)
         self._arrays = (
             forest.cell_of,
@@ -91,7 +91,7 @@ class IndexPlanner:
         cols = scene.ground.shape[1]
         at = state.cell[0] * cols + state.cell[1]
         heading = heading_index(state.heading)
-        region, length = follow_index(at, heading, belief.weights, sums.peaks, *self._arrays)
+        region, goal, length = follow_index(at, heading, belief.weights, sums.peaks, *self._arrays)
         unreachable = scene.unreachable(belief, sums)
         if region < 0:
             return any_move(scene, state, began, unreachable)
@@ -106,6 +106,7 @@ class IndexPlanner:
             Effort(0, time.perf_counter() - began),
             unreachable,
             remark_on(unreachable),
+            divmod(goal, cols),
             options,
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from roisearch.belief import Belief
-from roisearch.decision import Cell, Decision, Effort, SearchState, action_name
+from roisearch.decision import AHEAD, Cell, Decision, Effort, SearchState, action_name
 from roisearch.forest import ForestSums
 from roisearch.fov import FieldOfView, heading_index
 from roisearch.kernels.decide import decide
@@ -71,7 +71,8 @@ class PuctPlanner:
         worth[1:] = np.arange(1, farthest, dtype=np.float64) ** (-1.0 / s.alpha)
         self._random = np.zeros(1, dtype=np.uint64)
         self._shown = np.zeros((actions, 2))
-        self._path = np.zeros((2, rows + cols + 64), dtype=np.int64)
+        self._path = np.zeros((2, rows + cols + 64 if s.commit == "trip" else AHEAD), dtype=np.int64)
+        self._goals = np.full((regions, 3), -1, dtype=np.int64)
         self._arrays: tuple[Any, ...] = (
             forest.cell_of,
             forest.first,
@@ -89,7 +90,7 @@ class PuctPlanner:
             np.ones(cells if s.fades else 1),  # fade
             s.fades,
             np.zeros((s.rollout + 8 * (rows + cols)) * k, dtype=np.int64),  # log
-            np.full((regions, 3), -1, dtype=np.int64),  # goals
+            self._goals,
             np.zeros((regions, 4 * k, 3), dtype=np.int64),  # sources
             np.zeros(regions, dtype=np.int64),  # counts
             np.zeros(regions),  # means
@@ -167,8 +168,9 @@ class PuctPlanner:
             if done == most or (deadline_s is not None and time.perf_counter() - began >= deadline_s):
                 break
         path = cells_of(self._path, length)
+        goal = divmod(int(self._goals[action - 4, 0]), cols) if action >= 4 else None
         if action >= 4 and self.settings.commit != "never":
-            self._trip = _Trip(action, path, float(self._shown[action, 1]), belief.hits)
+            self._trip = _Trip(action, path, goal, float(self._shown[action, 1]), belief.hits)
         else:
             self._trip = None
         unreachable = scene.unreachable(belief, sums)
@@ -179,6 +181,7 @@ class PuctPlanner:
             Effort(done, time.perf_counter() - began),
             unreachable,
             remark_on(unreachable),
+            goal,
             self._shown.copy(),
         )
 
@@ -194,9 +197,8 @@ class PuctPlanner:
         """The rest of the trip that the planner is committed to."""
         unreachable = scene.unreachable(belief, sums)
         effort = Effort(0, time.perf_counter() - began)
-        return Decision(
-            rest, action_name(trip.action), trip.value, effort, unreachable, remark_on(unreachable)
-        )
+        remark = remark_on(unreachable)
+        return Decision(rest, action_name(trip.action), trip.value, effort, unreachable, remark, trip.goal)
 
     def warm_up(self, progress: Progress | None = None) -> None:
         """Compile every kernel that a decision and an observation use."""
@@ -208,10 +210,13 @@ class PuctPlanner:
 
 
 class _Trip:
-    """An option under way: its action, its cells, what it was worth, and the hits seen before it began."""
+    """An option under way: its action, cells, goal and value, and the hits seen before it began."""
 
-    def __init__(self, action: int, path: tuple[Cell, ...], value: float, hits: int) -> None:
+    def __init__(
+        self, action: int, path: tuple[Cell, ...], goal: Cell | None, value: float, hits: int
+    ) -> None:
         self.action = action
+        self.goal = goal
         self.value = value
         self._path = path
         self._hits = hits

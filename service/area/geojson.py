@@ -6,6 +6,7 @@ one failure for every type that did not match, and the operator needs one senten
 
 import json
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ WGS84_NAMES = frozenset({"crs84", "urn:ogc:def:crs:ogc::crs84", "urn:ogc:def:crs
 )
 """What a GeoJSON 2008 'crs' member may say; RFC 7946 removed it, QGIS and GDAL still write it."""
 
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 _UTF16_OR_32 = (b"\xff\xfe", b"\xfe\xff", b"\x00\x00\xfe\xff")
 _REPROJECT = "export it again in WGS84 (EPSG:4326)"
 
@@ -84,11 +86,22 @@ def load_json(data: bytes, where: Where) -> dict[str, Any]:
         ) from None
     except (ValueError, RecursionError):
         raise where.bad("not usable JSON (a number too long or too many levels); export it again") from None
+    if _SURROGATE.search(text) and not _is_whole(value):
+        raise where.bad("a text holds half of a character (\\ud800 to \\udfff); export the file again")
     if not isinstance(value, dict):
         raise where.bad(
             "not GeoJSON: the top level must be an object with a 'type', such as FeatureCollection"
         )
     return value
+
+
+def _is_whole(value: object) -> bool:
+    """False when a text in the value cannot be written as UTF-8: no report could ever name it."""
+    try:
+        json.dumps(value, ensure_ascii=False).encode("utf-8")
+    except (UnicodeEncodeError, RecursionError):
+        return False
+    return True
 
 
 def check_crs(item: dict[str, Any], where: Where) -> None:

@@ -71,6 +71,10 @@ def area_prior(
     return np.asarray(mass / mass.sum())
 
 
+_POINT = 1e-9
+"""A sigma below this part of a cell is a point; far below it, a cell's edge over sigma is no number."""
+
+
 def gaussian(frame: GridFrame, prior: PointPrior) -> FloatArray:
     """The mass of an isotropic Gaussian in each cell, float [rows, cols]: an exact integral, so that a
     sigma much smaller than a cell works too."""
@@ -82,7 +86,7 @@ def gaussian(frame: GridFrame, prior: PointPrior) -> FloatArray:
 
 def _normal_mass(cells: int, mean: float, sigma: float) -> FloatArray:
     """The mass of a normal distribution (in cells) in each cell of a line, precise in both tails."""
-    z = (np.arange(cells + 1) - mean) / sigma
+    z = (np.arange(cells + 1) - mean) / max(sigma, _POINT)
     low, high = z[:-1], z[1:]
     right = low > 0
     mass = np.where(right, ndtr(-low) - ndtr(-high), ndtr(high) - ndtr(low))

@@ -226,8 +226,11 @@ def _take_outside(parts: _Parts, holder: dict[str, Any], where: Where) -> None:
 
 
 def _text(holder: dict[str, Any], key: str) -> str:
+    """A text on one line: what a terminal would take for an order (RFC 8259 allows any) becomes a space."""
     value = holder.get(key)
-    return value.strip() if isinstance(value, str) else ""
+    if not isinstance(value, str):
+        return ""
+    return "".join(sign if sign.isprintable() else " " for sign in value).strip()
 
 
 def _check_extent(polygon: shapely.MultiPolygon, where: Where, max_area_km2: float) -> None:

@@ -83,10 +83,9 @@ class LinkCore:
         self.bytes_received = 0
         self.messages_received = 0
         self._speaks_first = speaks_first
-        self.signer = Signer(settings.signing_key) if settings.signing_key is not None else None
-        """What signs and checks signatures, if there is a key; its timestamp is the owner's to keep."""
-        self._codec = Codec(settings.system_id or _BEFORE_PAIRING_SYSTEM, settings.component_id, self.signer)
-        self._receiver = Receiver(self._codec)
+        signer = Signer(settings.signing_key) if settings.signing_key is not None else None
+        self.codec = Codec(settings.system_id or _BEFORE_PAIRING_SYSTEM, settings.component_id, signer)
+        self._receiver = Receiver(self.codec)
         self._boot = BootClock()
         self._streams = Streams(())
         self._book = CommandBook(
@@ -144,11 +143,6 @@ class LinkCore:
         """The frames to send now, in order, each to be one datagram; they are handed out once."""
         frames, self._outgoing = self._outgoing, []
         return frames
-
-    @property
-    def frames_refused(self) -> int:
-        """How many good frames were not believed, because they were not signed with our key."""
-        return self._codec.refused
 
     @property
     def paired(self) -> bool:
@@ -307,7 +301,7 @@ class LinkCore:
         self.autopilot = autopilot
         self.destination = source
         self._heard_at = now
-        self._codec.system_id = system
+        self.codec.system_id = system
         self._streams = Streams((*common_streams(self.settings), *autopilot.extra_streams))
         self.telemetry = t = heartbeat(
             replace(self.telemetry, system_id=system, autopilot=autopilot.name), message, autopilot, now
@@ -351,8 +345,8 @@ class LinkCore:
         ours = (message.target_system, message.target_component)
         if ours not in (
             (0, 0),
-            (self._codec.system_id, 0),
-            (self._codec.system_id, self._codec.component_id),
+            (self.codec.system_id, 0),
+            (self.codec.system_id, self.codec.component_id),
         ):
             return
         if message.command == mavlink.MAV_CMD_DO_REPOSITION:
@@ -492,7 +486,7 @@ class LinkCore:
         self._send(command.message(self.telemetry.system_id, _AUTOPILOT, confirmation))
 
     def _send(self, message: Message) -> None:
-        self._outgoing.append(self._codec.encode(message))
+        self._outgoing.append(self.codec.encode(message))
 
     def _done(self, done: list[CommandDone]) -> None:
         for event in done:

@@ -35,7 +35,8 @@ class Codec:
 
     def __init__(self, system_id: int, component_id: int, signer: Signer | None = None) -> None:
         self._mav = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
-        self._signer = signer
+        self.signer = signer
+        """Its timestamp is for the owner of the link to keep."""
         self.refused = 0
         """Good frames that were not signed as they should be."""
 
@@ -57,7 +58,7 @@ class Codec:
         """One MAVLink 2 frame, signed if there is a signer."""
         frame = bytes(message.pack(self._mav))
         self._mav.seq = (self._mav.seq + 1) % 256
-        return frame if self._signer is None else self._signer.sign(frame, message.crc_extra)
+        return frame if self.signer is None else self.signer.sign(frame, message.crc_extra)
 
     def decode(self, frame: bytearray) -> Message | None:
         """The message in a whole frame, or None if its checksum, length or content is wrong."""
@@ -68,17 +69,12 @@ class Codec:
 
     def trusts(self, frame: bytearray, message: Message) -> bool:
         """Whether a decoded frame may be believed; to be asked once for each."""
-        if self._signer is None or self._signer.verify(frame):
+        if self.signer is None or self.signer.verify(frame):
             return True
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_RADIO_STATUS:
             return True
         self.refused += 1
         return False
-
-    @property
-    def signs(self) -> bool:
-        """Whether only what is signed is believed."""
-        return self._signer is not None
 
 
 class Framer:
@@ -133,7 +129,7 @@ class Framer:
         """The checksum of an unknown message cannot be checked: its signature is, or its length by what follows."""
         if message.get_msgId() >= 0:
             return True
-        if self._codec.signs:
+        if self._codec.signer is not None:
             return trusted
         return end == len(self._buffer) or self._buffer[end] in (_V1, _V2)
 

@@ -95,7 +95,7 @@ class Vehicle:
             raise failure
 
     def _begin_signing(self) -> None:
-        signer = self._core.signer
+        signer = self._core.codec.signer
         if signer is not None:
             self._keeper = TimestampKeeper(signer, self.settings.signing_timestamp_file)
             self._keeper.begin()
@@ -170,9 +170,9 @@ class Vehicle:
             )
         if core.rejected:
             raise NoVehicle(f"the only autopilot heard on {where} cannot be flown: {core.rejected}")
-        if core.frames_refused and not core.messages_received:
+        if core.codec.refused and not core.messages_received:
             raise NoVehicle(
-                f"MAVLink is heard on {where}, but not signed with our key ({core.frames_refused} frames refused); "
+                f"MAVLink is heard on {where}, but not signed with our key ({core.codec.refused} frames refused); "
                 "is the key that of the vehicle, and does this link of it sign?"
             )
         if core.messages_received:

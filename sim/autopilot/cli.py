@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import os
 import signal
 import sys
 import time
@@ -74,6 +75,7 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--gust", type=float, default=0.0, help="m/s, standard deviation of the gusts")
     p.add_argument("--epoch", type=float, help="time of day at boot, seconds since 1970; default now")
+    p.add_argument("--attached", action="store_true", help="end when standard input closes")
     p.add_argument("--faults", type=Path, metavar="FILE", help="TOML file of faults")
     p.add_argument("--control", type=_host_port, metavar="HOST:PORT", help="control socket (loopback only)")
     return p
@@ -96,11 +98,29 @@ def settings_of(args: argparse.Namespace) -> Settings:
     )
 
 
+def _stop_with_standard_input(stop: asyncio.Event) -> None:
+    """Set `stop` when whoever started us is gone, however it went."""
+    loop, pipe = asyncio.get_running_loop(), sys.stdin.fileno()
+
+    def read() -> None:
+        if not os.read(pipe, 4096):
+            loop.remove_reader(pipe)
+            stop.set()
+
+    loop.add_reader(pipe, read)
+
+
 async def _serve(
-    settings: Settings, listen: list[Address], faults: list[Fault], control_at: tuple[str, int] | None
+    settings: Settings,
+    listen: list[Address],
+    faults: list[Fault],
+    control_at: tuple[str, int] | None,
+    attached: bool,
 ) -> int:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
+    if attached:
+        _stop_with_standard_input(stop)
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
     mock = Mock(Autopilot(settings))
@@ -147,4 +167,4 @@ def main(arguments: list[str]) -> int:
         print(f"roisearch-sim autopilot: {error}", file=sys.stderr)
         return 2
     listen = args.listen or [Address("udpin", "127.0.0.1", 14540)]
-    return asyncio.run(_serve(settings_of(args), listen, faults, args.control))
+    return asyncio.run(_serve(settings_of(args), listen, faults, args.control, args.attached))

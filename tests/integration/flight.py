@@ -75,7 +75,7 @@ class Process:
         with self._more:
             self._more.notify_all()
 
-    def wait_for(self, pattern: str, patience_s: float = 90.0) -> re.Match[str]:
+    def wait_for(self, pattern: str, patience_s: float = 150.0) -> re.Match[str]:
         """Wait until a line matches; AssertionError with everything said when it does not."""
         deadline = time.monotonic() + patience_s
         with self._more:
@@ -86,7 +86,7 @@ class Process:
                 self._more.wait(min(left, 1.0))
             return match
 
-    def exit_code(self, patience_s: float = 150.0) -> int:
+    def exit_code(self, patience_s: float = 240.0) -> int:
         """Wait for the end."""
         try:
             return self.process.wait(patience_s)

@@ -14,7 +14,7 @@ from service.evidence import Observation
 from service.journal import read_rows
 from tests.integration.flight import only_report, running, service_words, write_area
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = pytest.mark.timeout(600)
 
 
 def replayed(folder: Path, cell_m: float, count: int | None = None) -> tuple[str, int]:

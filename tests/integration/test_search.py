@@ -10,6 +10,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import httpx
@@ -18,7 +19,7 @@ import pytest
 from service.journal import read_rows
 from tests.integration.flight import FIELD, REPOSITORY, only_report, running, service_words, write_area
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = pytest.mark.timeout(600)
 FLAVORS = ("px4", "ardupilot")
 
 
@@ -183,3 +184,16 @@ def test_a_mock_that_dies_ends_the_run(tmp_path: Path) -> None:
         assert service.exit_code() == 4
     assert "the mock autopilot has ended" in service.said
     assert only_report(tmp_path / "runs")["outcome"] == "aborted"
+
+
+def test_the_mock_does_not_outlive_a_killed_service(tmp_path: Path) -> None:
+    with running(*service_words(write_area(tmp_path), tmp_path / "runs")) as service:
+        service.wait_for("→ TAKEOFF")
+        find = ["pgrep", "-P", str(service.process.pid), "-f", "sim autopilot"]
+        mock = int(subprocess.run(find, capture_output=True, text=True).stdout)
+        service.process.kill()
+        service.process.wait()
+        deadline = time.monotonic() + 20
+        while Path(f"/proc/{mock}/cmdline").exists() and Path(f"/proc/{mock}/cmdline").read_bytes():
+            assert time.monotonic() < deadline, "the mock autopilot goes on alone"
+            time.sleep(0.1)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 
 from roisearch import PLANNERS, Belief, FieldOfView, SearchState, make_planner
 from roisearch.bounds import multi_cell, release
+from roisearch.decision import AHEAD
 from roisearch.fov import HEADINGS, MOVES
 from roisearch.planners.base import Planner
 from tests.roisearch.strategies import World, worlds
@@ -187,8 +188,16 @@ def test_no_planner_beats_the_bound(name: str, fov: FieldOfView) -> None:
             gain += 0.9 * missed[tuple(seen)]
             missed[tuple(seen)] *= 1.0 - 0.9
         found.append(found[-1] + gain)
-    if fov.is_point:
-        bound = release(prior, start, 0.9, steps)
-    else:
-        bound = multi_cell(prior, start, fov, 0.9, steps)
+    point = fov.is_point
+    bound = release(prior, start, 0.9, steps) if point else multi_cell(prior, start, fov, 0.9, steps)
     assert (np.array(found) <= bound + 1e-12).all()
+
+
+@pytest.mark.parametrize("name", ["puct-regions-lite", "index"])
+def test_the_path_of_a_far_goal_is_cut_but_the_goal_is_told(name: str) -> None:
+    prior = np.full((5, 300), 1e-12)
+    prior[2, 290] = 1.0
+    planner = make_planner(name, fov=FieldOfView.point(), **({} if name == "index" else {"prior": "index"}))
+    decision = planner.plan(Belief(prior), SearchState((2, 3)), np.random.default_rng(0))
+    assert decision.goal == (2, 290)
+    assert decision.path == tuple((2, col) for col in range(4, 4 + AHEAD))

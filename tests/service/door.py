@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -11,7 +11,7 @@ import httpx
 from prometheus_client import CollectorRegistry
 
 from service.config import HttpSettings
-from service.http import Access, Door, create_app, open_door
+from service.http import Access, Door, Server, create_app, open_door, read_access
 from service.reports import Receipt, Report
 
 COMMAND, REPORT = "command-token-0123456789", "report-token-0123456789"
@@ -62,6 +62,9 @@ def bearer(token: str) -> dict[str, str]:
     return {"authorization": f"Bearer {token}"}
 
 
+TOKENS = read_access(settings(), both_tokens(), loopback=False)
+
+
 def in_memory(
     run: FakeRun, *, http: HttpSettings | None = None, access: Access | None = None, **more: Any
 ) -> httpx.AsyncClient:
@@ -71,12 +74,12 @@ def in_memory(
 
 
 @asynccontextmanager
-async def on_a_socket(
-    run: FakeRun, environment: Mapping[str, str] | None = None, **values: Any
-) -> AsyncIterator[Door]:
-    """The real server, on a real socket."""
-    door = open_door(settings(**values), environment or {})
+async def on_a_socket(run: FakeRun, *, any_address: bool = False, **values: Any) -> AsyncIterator[Door]:
+    """The real server, on a real socket; with `any_address` it takes that for one of many that it listens on."""
+    door = open_door(settings(**values), {})
     server = door.server(run)
+    if any_address:
+        server = Server(create_app(run, http=door.http, any_address=True), door.listener)
     serving = asyncio.create_task(server.run_until_told())
     try:
         while not server.started:  # noqa: ASYNC110 - uvicorn has nothing to wait for
@@ -104,3 +107,23 @@ async def say(door: Door, data: bytes, *, pause_s: float = 0.0, patience_s: floa
         return answer
     finally:
         writer.close()
+
+
+def ask(
+    method: str,
+    path: str,
+    *,
+    json: Any = None,
+    headers: dict[str, str] | None = None,
+    access: Access | None = None,
+    http: HttpSettings | None = None,
+    run: FakeRun | None = None,
+    **more: Any,
+) -> httpx.Response:
+    """One request to a fresh door."""
+
+    async def once() -> httpx.Response:
+        async with in_memory(run or FakeRun(), http=http, access=access, **more) as client:
+            return await client.request(method, path, json=json, headers=headers)
+
+    return asyncio.run(once())

@@ -427,3 +427,15 @@ def test_area_limit_and_launch_limit_can_be_set() -> None:
 def test_holes_do_not_count_for_the_area_limit() -> None:
     ring_shaped = polygon(box(-6000, -6000, 6000, 6000), box(-5000, -5000, 5000, 5000))
     assert not parse(ring_shaped, max_area_km2=45).ground.is_empty
+
+
+def test_a_name_gives_no_orders_to_the_terminal_it_is_shown_in() -> None:
+    area = parse({**collection(feature(polygon(BOX))), "name": "north\n\x1b[2Jslope "})
+    assert area.name == "north  [2Jslope"
+
+
+def test_half_of_a_character_is_refused_before_the_flight_not_when_the_report_is_written() -> None:
+    data = json.dumps({**collection(feature(polygon(BOX))), "name": "\ud800"}).encode()
+    assert "half of a character" in refusal(lambda: parse_area(data, source="a.geojson"))
+    whole = json.dumps({**collection(feature(polygon(BOX))), "name": "\U0001f6a9"}).encode()
+    assert parse_area(whole, source="a.geojson").name == "\U0001f6a9"

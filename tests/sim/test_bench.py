@@ -13,7 +13,7 @@ from sim.__main__ import main
 def test_bench_prints_ratios_and_writes_table_and_plot(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["bench", "--steps", "10", "--largest", "200", "--out", str(tmp_path)]) == 0
+    assert main(["bench", "--steps", "20", "--largest", "200", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert "times faster than its twin" in said
     assert "| iterations |" in (tmp_path / "bench.md").read_text(encoding="utf-8")
@@ -21,7 +21,7 @@ def test_bench_prints_ratios_and_writes_table_and_plot(
 
 
 def test_the_planner_is_far_faster_than_its_twin() -> None:
-    ratios = bench.against_twin(30, lambda line: None)
+    ratios = bench.against_twin(40, lambda line: None)
     assert ratios["puct-regions-lite"] > 50  # a third of the target: this machine may be busy
     assert ratios["BMDP-O / lite"] < bench.REGIONS_AT_MOST
 
@@ -29,4 +29,4 @@ def test_the_planner_is_far_faster_than_its_twin() -> None:
 def test_a_twin_that_decides_otherwise_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench.TwinPlanner, "_roll_out", lambda self, cell, heading: float(cell[0]))
     with pytest.raises(AssertionError, match="decide differently"):
-        bench.against_twin(30, lambda line: None)
+        bench.against_twin(40, lambda line: None)

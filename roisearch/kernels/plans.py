@@ -1,0 +1,449 @@
+"""PUCT over sweeps: a tree along the plan that is being flown, grown a little at every step.
+
+The lite MDP-O with options that sweep. The map in the tree is depleted by what the tree looks at and is
+otherwise static: no observation branches. So the tree has no chance nodes, the best return is attainable,
+and one line of actions, the *plan*, is always the best known. Nodes stand along the plan, `spacing` steps
+apart. In each node the actions are to *keep to the plan*, to sweep any one region down to a level, to sweep
+anywhere, and at the root the four moves. An iteration
+
+1. selects: from the root it follows argmax Q + explore * P * sqrt(N) / (1 + n), flying the plan as long as
+   that says to keep to it, and adds one node where the plan has none yet;
+2. simulates: at another action, it draws how far down to sweep (lambda), for how long at most, and with
+   which balance of worth and distance, and follows that sweep; then the index rule, as the rollout, to the
+   horizon of the plan;
+3. evaluates: the area under the survival curve, which is the expected time, plus what clearing the rest
+   takes without travel, times `overhead`;
+4. backs up: the visits, and the least loss against the plan. When the new line is better it becomes the
+   plan, and the nodes after the branch are dropped with it.
+
+Q is 1 for keeping to the plan and 1 / (1 + loss / (spread * expected time)) for the best seen of another
+action; it is 1 for one not tried. P is `keep` for keeping to the plan; the rest is divided in proportion to
+each region's best index.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roisearch.kernels.chart import Chart, Floats, Ints, begin, copy_table, restore, time_to_clear
+from roisearch.kernels.compiled import kernel
+from roisearch.kernels.sweeps import (
+    ANYWHERE,
+    Wave,
+    col_of_move,
+    fly,
+    region_scores,
+    row_of_move,
+    sweep,
+)
+
+MULTIPLIER = np.uint64(6364136223846793005)
+INCREMENT = np.uint64(1442695040888963407)
+
+
+class Rules(NamedTuple):
+    """The settings of the search; see `SweepSettings`.
+
+    nears: float [balances, distances], score of a cell by distance; row 0 is the rollout's. followers: how
+    many of the first rows may be a rollout's. looks_per_halving, looks_per_step: `time_to_clear`.
+    """
+
+    nears: Floats
+    followers: int
+    explore: float
+    keep: float
+    spread: float
+    spacing: int
+    overhead: float
+    looks_per_halving: float
+    looks_per_step: float
+
+
+class Tree(NamedTuple):
+    """The plan and the nodes along it.
+
+    path: int [most], cells of the plan; now, length and nodes are in `mark` [NOW, LENGTH, NODES]. action:
+    int [most], what each step of the plan belongs to: a region's label, or ANYWHERE. trial, trial_action:
+    the same of the line being tried. at: int [nodes], where on the path a node stands. stats: float [nodes,
+    actions, 3]: P(a), least loss (of keeping to the plan: 0), visits. Actions: 0-3 moves, 4 anywhere, 4 + k
+    region k, last: keep to the plan. worths: float [nodes, regions + 1], the largest worth in each region.
+    scores: float [regions + 1], room. value: float [EXPECTED, ...], area under the survival curve of the
+    plan, the rest included.
+    """
+
+    path: Ints
+    trial: Ints
+    action: Ints
+    trial_action: Ints
+    mark: Ints
+    at: Ints
+    stats: Floats
+    worths: Floats
+    scores: Floats
+    value: Floats
+
+
+NOW, LENGTH, NODES = 0, 1, 2
+P_A, LOSS, N_A = 0, 1, 2
+EXPECTED, UNDETECTED = 0, 1
+
+
+@kernel
+def draw(state: NDArray[np.uint64]) -> float:
+    """A number from 0 to just below 1, from a linear congruential generator (Knuth's MMIX constants)."""
+    state[0] = state[0] * MULTIPLIER + INCREMENT
+    return float(np.int64(state[0] >> np.uint64(11))) * 2.0**-53
+
+
+@kernel
+def fill(array: Ints, first: int, last: int, value: int) -> None:
+    """array[first:last] = value."""
+    for i in range(first, last):
+        array[i] = value
+
+
+@kernel
+def copy_range(source: Ints, target: Ints, first: int, last: int) -> None:
+    """target[first:last] = source[first:last]."""
+    for i in range(first, last):
+        target[i] = source[i]
+
+
+@kernel
+def rest(chart: Chart, undetected: float, rules: Rules) -> float:
+    """What clearing the rest takes, from the horizon on."""
+    return rules.overhead * time_to_clear(
+        chart.levels, undetected, rules.looks_per_halving, rules.looks_per_step
+    )
+
+
+@kernel
+def evaluate(row: int, col: int, heading: int, chart: Chart, tree: Tree, rules: Rules) -> float:
+    """The area under the survival curve of the plan from now on."""
+    begin(chart)
+    area, undetected, row, col, heading = fly(
+        row, col, heading, chart, tree.value[UNDETECTED], tree.path, tree.mark[NOW], tree.mark[LENGTH], True
+    )
+    area += rest(chart, undetected, rules)
+    restore(chart)
+    return area
+
+
+@kernel
+def extend(
+    row: int,
+    col: int,
+    heading: int,
+    chart: Chart,
+    tree: Tree,
+    rules: Rules,
+    labels: NDArray[np.int32],
+    home: NDArray[np.int32],
+    horizon: int,
+    wave: Wave,
+) -> None:
+    """Carry the plan on by the rollout's rule until it is `horizon` steps long, and evaluate it."""
+    begin(chart)
+    now, length = tree.mark[NOW], tree.mark[LENGTH]
+    area, undetected, row, col, heading = fly(
+        row, col, heading, chart, tree.value[UNDETECTED], tree.path, now, length, True
+    )
+    more, undetected, steps, row, col, heading = sweep(
+        row, col, heading, chart, rules.nears[0], labels, home, ANYWHERE, 0.0, now + horizon - length,
+        undetected, tree.path, length, wave,
+    )  # fmt: skip
+    fill(tree.action, length, length + steps, ANYWHERE)
+    tree.mark[LENGTH] = length + steps
+    tree.value[EXPECTED] = area + more + rest(chart, undetected, rules)
+    restore(chart)
+
+
+@kernel
+def add_node(
+    node: int,
+    at: int,
+    row: int,
+    col: int,
+    chart: Chart,
+    tree: Tree,
+    rules: Rules,
+    labels: NDArray[np.int32],
+    home: NDArray[np.int32],
+) -> None:
+    """A new last node, with P(a) of its actions."""
+    tree.mark[NODES] = node + 1
+    tree.at[node] = at
+    stats, scores = tree.stats[node], tree.scores
+    for action in range(stats.shape[0]):
+        stats[action, P_A] = stats[action, LOSS] = stats[action, N_A] = 0.0
+    regions = tree.worths.shape[1]
+    region_scores(row, col, chart, rules.nears[0], labels, home, scores, tree.worths[node])
+    best = total = 0.0
+    for region in range(regions):
+        best = max(best, scores[region])
+        total += scores[region] if region > 0 else 0.0
+    share = (1.0 - rules.keep) / (best + total) if best > 0.0 else 0.0
+    stats[4, P_A] = share * best
+    for region in range(1, regions):
+        stats[4 + region, P_A] = share * scores[region]
+    stats[stats.shape[0] - 1, P_A] = rules.keep
+
+
+@kernel
+def open_moves(row: int, col: int, chart: Chart, tree: Tree, rules: Rules) -> None:
+    """Let the root have the four moves as actions."""
+    for move in range(4):
+        legal = chart.legal[row * chart.cols + col] >> move & 1
+        tree.stats[0, move, P_A] = 0.1 * (1.0 - rules.keep) if legal else -1.0
+
+
+@kernel
+def select(node: int, tree: Tree, rules: Rules, may_keep: bool) -> int:
+    """The action with the largest PUCT score; -1 when the node has none."""
+    stats = tree.stats[node]
+    last = stats.shape[0] - 1
+    visits = 1.0
+    for action in range(stats.shape[0]):
+        visits += stats[action, N_A]
+    best, best_score = -1, -np.inf
+    for action in range(stats.shape[0]):
+        if stats[action, P_A] <= 0.0 or (action == last and not may_keep):
+            continue
+        worth = 1.0
+        if stats[action, N_A] > 0.0 and tree.value[EXPECTED] > 0.0:
+            worth = 1.0 / (1.0 + stats[action, LOSS] / (rules.spread * tree.value[EXPECTED]))
+        score = worth + rules.explore * stats[action, P_A] * np.sqrt(visits) / (1.0 + stats[action, N_A])
+        if score > best_score:
+            best, best_score = action, score
+    return best
+
+
+@kernel
+def iterate(
+    row: int,
+    col: int,
+    heading: int,
+    chart: Chart,
+    tree: Tree,
+    rules: Rules,
+    labels: NDArray[np.int32],
+    home: NDArray[np.int32],
+    wave: Wave,
+    state: NDArray[np.uint64],
+) -> None:
+    """One iteration; see the module's text. The pose is the root's, at path[NOW]."""
+    begin(chart)
+    keep = tree.stats.shape[1] - 1
+    end = tree.mark[LENGTH]
+    t = tree.mark[NOW]
+    node = 0
+    area, undetected = 0.0, tree.value[UNDETECTED]
+    fresh = False
+    while True:
+        following = node + 1
+        there = tree.at[node] + rules.spacing if following >= tree.mark[NODES] else tree.at[following]
+        may_keep = not fresh and there + rules.spacing <= end and following < tree.at.size
+        action = select(node, tree, rules, may_keep)
+        if action != keep:
+            break
+        tree.stats[node, keep, N_A] += 1.0
+        more, undetected, row, col, heading = fly(
+            row, col, heading, chart, undetected, tree.path, t, there, True
+        )
+        area += more
+        t = there
+        if following >= tree.mark[NODES]:
+            add_node(following, t, row, col, chart, tree, rules, labels, home)
+            fresh = True
+        node = following
+    if action < 0:
+        restore(chart)
+        return
+
+    begun = t
+    region, floor, most = ANYWHERE, 0.0, int(10.0 ** (1.0 + 2.0 * draw(state)))
+    balance = int(draw(state) * rules.nears.shape[0])
+    if action < 4:
+        row, col, heading = row + row_of_move(action), col + col_of_move(action), action
+        tree.trial[t] = row * chart.cols + col
+        more, undetected, row, col, heading = fly(
+            row, col, action, chart, undetected, tree.trial, t, t + 1, True
+        )
+        area += more
+        t += 1
+        most = 0
+    elif action > 4:
+        region = action - 4
+        floor = tree.worths[node, region] * 10.0 ** (-0.05 - 1.6 * draw(state))
+    most = min(most, end - t)
+    more, undetected, steps, row, col, heading = sweep(
+        row, col, heading, chart, rules.nears[balance], labels, home, region, floor, most, undetected,
+        tree.trial, t, wave,
+    )  # fmt: skip
+    area += more
+    turned = t + steps
+    follower = int(draw(state) * rules.followers) if draw(state) < 0.3 else 0
+    more, undetected, steps, row, col, heading = sweep(
+        row, col, heading, chart, rules.nears[follower], labels, home, ANYWHERE, 0.0, end - turned,
+        undetected, tree.trial, turned, wave,
+    )  # fmt: skip
+    area += more + rest(chart, undetected, rules)
+    restore(chart)
+
+    loss = area - tree.value[EXPECTED]
+    stats = tree.stats[node, action]
+    if turned + steps < end:  # nothing left to sweep, or no more room: not comparable
+        loss = max(loss, rules.spread * tree.value[EXPECTED])
+    stats[LOSS] = loss if stats[N_A] == 0.0 else min(stats[LOSS], loss)
+    stats[N_A] += 1.0
+    if loss >= -1e-12 * tree.value[EXPECTED]:
+        stats[LOSS] = max(stats[LOSS], 0.0)
+        return
+    adopt(node, begun, turned, end, region, loss, tree)
+
+
+@kernel
+def adopt(node: int, begun: int, turned: int, end: int, region: int, loss: float, tree: Tree) -> None:
+    """Make the trial the plan: it leaves the plan at `begun` and sweeps `region` until `turned`."""
+    copy_range(tree.trial, tree.path, begun, end)
+    fill(tree.action, begun, turned, region)
+    fill(tree.action, turned, end, ANYWHERE)
+    tree.value[EXPECTED] += loss
+    tree.mark[NODES] = node + 1
+    keep = tree.stats.shape[1] - 1
+    for earlier in range(node + 1):
+        for action in range(keep):
+            if tree.stats[earlier, action, N_A] > 0.0:
+                tree.stats[earlier, action, LOSS] = max(0.0, tree.stats[earlier, action, LOSS] - loss)
+
+
+@kernel
+def advance(
+    steps: int,
+    row: int,
+    col: int,
+    heading: int,
+    chart: Chart,
+    tree: Tree,
+) -> tuple[int, int, int]:
+    """Fly the next steps of the plan for good, seeing nothing; returns the pose."""
+    area, undetected, row, col, heading = fly(
+        row,
+        col,
+        heading,
+        chart,
+        tree.value[UNDETECTED],
+        tree.path,
+        tree.mark[NOW],
+        tree.mark[NOW] + steps,
+        False,
+    )
+    tree.value[EXPECTED] -= area
+    tree.value[UNDETECTED] = undetected
+    tree.mark[NOW] += steps
+    return row, col, heading
+
+
+@kernel
+def settle_root(
+    row: int,
+    col: int,
+    chart: Chart,
+    tree: Tree,
+    rules: Rules,
+    labels: NDArray[np.int32],
+    home: NDArray[np.int32],
+) -> None:
+    """Drop the nodes that were passed; the last of them becomes the root, with its numbers."""
+    now = tree.mark[NOW]
+    passed = 0
+    while passed < tree.mark[NODES] and tree.at[passed] <= now:
+        passed += 1
+    if passed == 0:
+        add_node(0, now, row, col, chart, tree, rules, labels, home)
+    elif passed > 1:
+        left = tree.mark[NODES] - passed + 1
+        for node in range(left):
+            tree.at[node] = tree.at[node + passed - 1]
+            copy_table(tree.stats[node + passed - 1], tree.stats[node])
+            for region in range(tree.worths.shape[1]):
+                tree.worths[node, region] = tree.worths[node + passed - 1, region]
+        tree.mark[NODES] = left
+    if tree.at[0] < now:
+        for move in range(4):
+            tree.stats[0, move, LOSS] = tree.stats[0, move, N_A] = 0.0
+    tree.at[0] = now
+    open_moves(row, col, chart, tree, rules)
+
+
+@kernel
+def replan(
+    row: int,
+    col: int,
+    heading: int,
+    chart: Chart,
+    tree: Tree,
+    rules: Rules,
+    labels: NDArray[np.int32],
+    home: NDArray[np.int32],
+    horizon: int,
+    pause: int,
+    wave: Wave,
+) -> None:
+    """Plan anew from here: by the rollout's rule, or by it for `pause` steps and then the old plan's sweeps.
+
+    The better of the two becomes the plan, at the start of the path. With `pause` < 0 there is no old plan.
+    """
+    tree.mark[NODES] = 0
+    now, length = tree.mark[NOW], tree.mark[LENGTH]
+    start_row, start_col, start_heading = row, col, heading
+    old_area = np.inf
+    old_steps = 0
+    if pause >= 0:
+        begin(chart)
+        undetected = tree.value[UNDETECTED]
+        old_area = 0.0
+        i = now
+        region, most = ANYWHERE, pause
+        while old_steps < horizon:
+            more, undetected, steps, row, col, heading = sweep(
+                row, col, heading, chart, rules.nears[0], labels, home, region, 0.0,
+                min(most, horizon - old_steps), undetected, tree.trial, old_steps, wave,
+            )  # fmt: skip
+            fill(tree.trial_action, old_steps, old_steps + steps, region)
+            old_area += more
+            old_steps += steps
+            if i >= length:
+                if region == ANYWHERE:
+                    break
+                region, most = ANYWHERE, horizon
+                continue
+            region, most = tree.action[i], 0
+            while i < length and tree.action[i] == region:
+                most += 1
+                i += 1
+            if i >= length and region == ANYWHERE:
+                most = horizon
+        old_area += rest(chart, undetected, rules)
+        restore(chart)
+    row, col, heading = start_row, start_col, start_heading
+    begin(chart)
+    area, undetected, steps, row, col, heading = sweep(
+        row, col, heading, chart, rules.nears[0], labels, home, ANYWHERE, 0.0, horizon,
+        tree.value[UNDETECTED], tree.path, 0, wave,
+    )  # fmt: skip
+    area += rest(chart, undetected, rules)
+    restore(chart)
+    tree.mark[NOW] = 0
+    if old_area < area and old_steps >= steps:
+        copy_range(tree.trial, tree.path, 0, old_steps)
+        copy_range(tree.trial_action, tree.action, 0, old_steps)
+        tree.mark[LENGTH] = old_steps
+        tree.value[EXPECTED] = old_area
+    else:
+        fill(tree.action, 0, steps, ANYWHERE)
+        tree.mark[LENGTH] = steps
+        tree.value[EXPECTED] = area

@@ -1,0 +1,62 @@
+"""The exact ruler: the detection curve of a planner, without waiting for luck.
+
+The planner is run as if the target stayed undetected. For each cell u is the mass that is still undetected
+there; every look at the cell adds p_tp * u to F and leaves (1 - p_tp) * u. F(t) is then the distribution of
+the time of the first true hit over all targets and all true detections, for this one sequence of looks.
+With p_tn < 1 false alarms are drawn at every cell looked at; F is exact for them as drawn, except that a
+target's own cell cannot give a false alarm, which the drawn sequence ignores.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roisearch import Belief, FieldOfView, Planner, SearchState
+from roisearch.fov import HEADINGS, MOVES
+
+
+def detection_curve(
+    planner: Planner,
+    prior: NDArray[np.float64],
+    start: tuple[int, int],
+    p_tp: float,
+    steps: int,
+    rng: np.random.Generator,
+    p_tn: float = 1.0,
+    fov: FieldOfView | None = None,
+    *,
+    heading: str = "north",
+    deadline_s: float | None = None,
+    stop_below: float = 0.0,
+    searchable: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float64]:
+    """F of `planner` on `prior`, float [steps + 1]; it plans at every step.
+
+    Args: p_tp, p_tn: of every cell of the field of view. fov: what is seen; a point unless given. The
+        planner must have been made for the same. deadline_s: handed to `plan`. stop_below: stop when less
+        than this is undetected, and count F as constant from there on, which can only overstate the
+        expected time.
+    """
+    view = fov or FieldOfView.point()
+    belief = Belief(prior, searchable=searchable)
+    undetected = belief.probability()
+    state = SearchState(start, heading)
+    curve = np.zeros(steps + 1)
+    found = 0.0
+    for step in range(1, steps + 1):
+        decision = planner.plan(belief, state, rng, deadline_s=deadline_s)
+        cell = decision.path[0]
+        move = MOVES.index((cell[0] - state.cell[0], cell[1] - state.cell[1]))
+        state = SearchState(cell, HEADINGS[move])
+        seen = view.cells(cell, state.heading, belief.shape)
+        rows, cols = seen[:, 0], seen[:, 1]
+        found += p_tp * float(undetected[rows, cols].sum())
+        undetected[rows, cols] *= 1.0 - p_tp
+        curve[step] = found
+        if len(seen):
+            belief.observe(seen, rng.random(len(seen)) >= p_tn, p_tp, p_tn)
+        if 1.0 - found < stop_below:
+            curve[step:] = found
+            break
+    return np.minimum(curve, 1.0)

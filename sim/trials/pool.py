@@ -1,0 +1,108 @@
+"""Where jobs run: a `concurrent.futures.Executor`, of processes here or of a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from typing import Any
+
+from sim.trials.campaign import Campaign, Job
+from sim.trials.trial import run_job
+
+CONNECT_TIMEOUT_S = 15.0
+"""How long a Dask scheduler may take to answer."""
+
+_AHEAD = 64
+"""Jobs handed in and not done yet, per worker: enough to keep every worker busy, few enough to stop at once."""
+
+
+@contextmanager
+def executor(jobs: int, scheduler: str = "") -> Iterator[tuple[Executor, int]]:
+    """An executor and how many workers it has: `jobs` processes here, or the cluster at `scheduler`.
+
+    Raises:
+        ValueError: when the cluster does not answer, or its client is not installed.
+    """
+    if scheduler:
+        with _cluster(scheduler) as answer:
+            yield answer
+        return
+    pool = ProcessPoolExecutor(
+        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_the_campaign
+    )
+    try:
+        yield pool, jobs
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _end_with_the_campaign() -> None:
+    """Let Ctrl-C, and the end of the campaign however it comes, end a worker at once and without a word."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
+    try:
+        import distributed
+    except ImportError:
+        raise ValueError("--scheduler needs Dask: pip install 'roisearch[cluster]'") from None
+    library: Any = distributed
+    try:
+        client = library.Client(scheduler, timeout=CONNECT_TIMEOUT_S)
+    except OSError:
+        raise ValueError(f"no Dask scheduler answers at {scheduler}") from None
+    with client:
+        workers = sum(client.nthreads().values())
+        if workers == 0:
+            raise ValueError(f"the Dask scheduler at {scheduler} has no workers")
+        pool = client.get_executor(pure=False, retries=1)
+        try:
+            yield pool, workers
+        finally:
+            pool.shutdown(wait=False)
+
+
+def run(
+    pool: Executor,
+    workers: int,
+    campaign: Campaign,
+    jobs: Sequence[Job],
+    done: Callable[[Job, list[dict[str, Any]]], None],
+) -> None:
+    """Run the jobs in any order; `done` is called here, in this thread, for each as it ends.
+
+    Raises:
+        Whatever a job raises; what was handed in and not begun is then cancelled.
+    """
+    left = iter(jobs)
+    waiting: dict[Future[list[dict[str, Any]]], Job] = {}
+
+    def hand_in(count: int) -> None:
+        for _, job in zip(range(count), left, strict=False):
+            waiting[pool.submit(run_job, campaign, job)] = job
+
+    hand_in(_AHEAD * workers)
+    try:
+        while waiting:
+            for future in as_completed(list(waiting)):
+                done(waiting.pop(future), future.result())
+                if len(waiting) < _AHEAD * workers // 2:
+                    break
+            hand_in(_AHEAD * workers - len(waiting))
+    finally:
+        for future in waiting:
+            future.cancel()

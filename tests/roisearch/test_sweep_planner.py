@@ -1,0 +1,193 @@
+"""The sweep planner as its callers see it: any field of view, shape, obstacles, hits, deadlines."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from roisearch import Belief, FieldOfView, SearchState, make_planner
+from roisearch.fov import HEADINGS, MOVES
+from roisearch.planners.sweep import SweepPlanner, SweepSettings
+from sim.scenario import paper_prior
+
+FOVS = {"point": FieldOfView.point(), "donut": FieldOfView.donut(), "wide": FieldOfView.wide_angle()}
+
+QUICK = SweepSettings(iterations=2, horizon=500)
+
+
+def hill(shape: tuple[int, int], centre: tuple[float, float], width: float) -> np.ndarray:
+    row, col = np.indices(shape)
+    return np.exp(-((row - centre[0]) ** 2 + (col - centre[1]) ** 2) / (2 * width**2))
+
+
+def after(state: SearchState, cell: tuple[int, int]) -> SearchState:
+    move = MOVES.index((cell[0] - state.cell[0], cell[1] - state.cell[1]))
+    return SearchState(cell, HEADINGS[move])
+
+
+def fly(
+    planner: SweepPlanner, belief: Belief, fov: FieldOfView, state: SearchState, steps: int
+) -> list[SearchState]:
+    """Fly so many steps, seeing nothing; where it was."""
+    rng = np.random.default_rng(0)
+    states = [state]
+    for _ in range(steps):
+        state = after(state, planner.plan(belief, state, rng).path[0])
+        belief.observe(fov.cells(state.cell, state.heading, belief.shape), False, 0.9, 1.0)
+        states.append(state)
+    return states
+
+
+def test_it_is_the_default_of_lite_and_the_papers_preset_is_not() -> None:
+    assert isinstance(make_planner("puct-regions-lite", fov=FOVS["point"]), SweepPlanner)
+    for preset in ("paper", "trips"):
+        assert not isinstance(
+            make_planner("puct-regions-lite", fov=FOVS["point"], preset=preset), SweepPlanner
+        )
+
+
+@pytest.mark.parametrize("options", [{"iterations": -1}, {"rollout": 60}, {"keep": 1.0}, {"horizon": 3}])
+def test_options_out_of_range_are_refused(options: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"keep|iterations|rollout|horizon"):
+        make_planner("puct-regions-lite", fov=FOVS["point"], **options)
+
+
+@pytest.mark.parametrize("name", FOVS)
+def test_it_finds_nearly_all_mass_of_a_hill(name: str) -> None:
+    fov = FOVS[name]
+    belief = Belief(hill((30, 34), (20, 22), 3.0), outside=0.2)
+    planner = SweepPlanner(SweepSettings(iterations=1, horizon=300), fov=fov)
+    fly(planner, belief, fov, SearchState((2, 2)), 700)
+    assert belief.outside > 0.9
+
+
+@pytest.mark.parametrize("name", FOVS)
+@pytest.mark.parametrize("shape", [(1, 9), (9, 1), (3, 5), (17, 23)])
+def test_every_path_is_made_of_flyable_neighbours_on_any_map(name: str, shape: tuple[int, int]) -> None:
+    fov, rng = FOVS[name], np.random.default_rng(3)
+    belief = Belief(rng.random(shape) ** 4)
+    flyable = np.ones(shape, dtype=bool)
+    if min(shape) > 2:
+        flyable[shape[0] // 2, : shape[1] - 1] = False
+    planner = SweepPlanner(SweepSettings(iterations=2, horizon=200), fov=fov, flyable=flyable)
+    state = SearchState((0, 0))
+    for step in range(60):
+        decision = planner.plan(belief, state, rng)
+        at = state.cell
+        for cell in decision.path:
+            assert abs(cell[0] - at[0]) + abs(cell[1] - at[1]) == 1
+            assert flyable[cell]
+            at = cell
+        state = after(state, decision.path[0])
+        seen = fov.cells(state.cell, state.heading, shape)
+        if len(seen):
+            belief.observe(seen, rng.random(len(seen)) < 0.1 * (step % 3 == 0), 0.9, 0.9)
+
+
+def test_it_goes_around_a_wall_to_what_is_behind_it() -> None:
+    flyable = np.ones((20, 20), dtype=bool)
+    flyable[:19, 10] = False
+    belief = Belief(hill((20, 20), (2, 14), 1.5))
+    planner = SweepPlanner(SweepSettings(iterations=2, horizon=300), fov=FOVS["point"], flyable=flyable)
+    fly(planner, belief, FOVS["point"], SearchState((2, 8)), 120)
+    assert belief.probability()[1:4, 13:16].max() < 0.2
+
+
+def test_it_looks_again_at_a_cell_with_a_hit() -> None:
+    prior = hill((60, 60), (30, 30), 8.0)
+    belief, rng = Belief(prior), np.random.default_rng(0)
+    planner = SweepPlanner(QUICK, fov=FOVS["point"])
+    state = SearchState((30, 20))
+    for _ in range(20):
+        state = after(state, planner.plan(belief, state, rng).path[0])
+        belief.observe([state.cell], [False], 0.9, 0.9)
+    state = after(state, planner.plan(belief, state, rng).path[0])
+    belief.observe([state.cell], [True], 0.9, 0.9)
+    hit = state.cell
+    visited = []
+    for _ in range(3):
+        state = after(state, planner.plan(belief, state, rng).path[0])
+        belief.observe([state.cell], [False], 0.9, 0.9)
+        visited.append(state.cell)
+    assert hit in visited
+
+
+def test_thinking_goes_on_where_it_stopped_when_the_plan_is_flown() -> None:
+    belief, rng = Belief(paper_prior(np.random.default_rng(1000))), np.random.default_rng(0)
+    planner = SweepPlanner(SweepSettings(iterations=8, horizon=800), fov=FOVS["point"])
+    state = SearchState((5, 5))
+    first = expected = planner.plan(belief, state, rng).value
+    for step in range(30):
+        flown = 1 + step % 2  # a caller may fly several cells between two plans, and report late or never
+        for cell in planner.plan(belief, state, rng).path[:flown]:
+            state = after(state, cell)
+        decision = planner.plan(belief, state, rng)
+        assert decision.value >= expected + flown * (1.0 - 1e-6)  # nothing to be seen out here: time passes
+        expected = decision.value
+    assert expected > first + 45.0 + 1.0  # and the plan got better
+
+
+def test_the_same_seed_gives_the_same_search() -> None:
+    paths = []
+    for _ in range(2):
+        belief = Belief(paper_prior(np.random.default_rng(1001)))
+        states = fly(SweepPlanner(QUICK, fov=FOVS["point"]), belief, FOVS["point"], SearchState((5, 5)), 40)
+        paths.append([state.cell for state in states])
+    assert paths[0] == paths[1]
+
+
+def test_planning_does_not_change_the_belief() -> None:
+    belief = Belief(paper_prior(np.random.default_rng(1002)))
+    before = belief.digest()
+    SweepPlanner(QUICK, fov=FOVS["donut"]).plan(belief, SearchState((5, 5)), np.random.default_rng(0))
+    assert belief.digest() == before
+
+
+def test_a_deadline_stops_an_endless_search() -> None:
+    belief, rng = Belief(paper_prior(np.random.default_rng(1002))), np.random.default_rng(0)
+    planner = SweepPlanner(SweepSettings(iterations=None), fov=FOVS["point"])
+    state = SearchState((5, 5))
+    planner.plan(belief, state, rng, deadline_s=0.05)
+    short = planner.plan(belief, state, rng, deadline_s=0.02).effort
+    long = planner.plan(belief, state, rng, deadline_s=0.4).effort
+    assert long.iterations > short.iterations
+    assert long.seconds < 4.0
+    with pytest.raises(ValueError, match="deadline"):
+        planner.plan(belief, state, rng)
+
+
+def test_another_belief_or_place_is_planned_anew() -> None:
+    rng = np.random.default_rng(0)
+    planner = SweepPlanner(QUICK, fov=FOVS["point"])
+    east, west = Belief(hill((40, 40), (20, 35), 2.0)), Belief(hill((40, 40), (20, 5), 2.0))
+    middle = SearchState((20, 20))
+    assert planner.plan(east, middle, rng).path[0] == (20, 21)
+    assert planner.plan(west, middle, rng).path[0] == (20, 19)
+    assert planner.plan(east, SearchState((20, 39)), rng).path[0] == (20, 38)
+
+
+def test_a_second_look_at_a_cell_outside_the_plan_is_taken_in() -> None:
+    """Reports of cells elsewhere, as another drone's detector would give them, move the plan."""
+    rng = np.random.default_rng(0)
+    belief = Belief(hill((40, 40), (20, 35), 2.0) + hill((40, 40), (20, 5), 2.0))
+    planner = SweepPlanner(QUICK, fov=FOVS["point"])
+    state = SearchState((20, 20))
+    planner.plan(belief, state, rng)
+    there = np.argwhere(np.indices((40, 40))[1] > 20)
+    belief.observe(there, False, 0.99, 0.9)
+    assert planner.plan(belief, state, rng).path[0] == (20, 19)
+
+
+def test_alternatives_say_what_was_thought_of_each_region() -> None:
+    belief = Belief(hill((60, 60), (50, 10), 3.0) + 0.6 * hill((60, 60), (10, 50), 3.0))
+    planner = SweepPlanner(SweepSettings(iterations=200, horizon=600), fov=FOVS["point"])
+    started = time.perf_counter()
+    decision = planner.plan(belief, SearchState((30, 30)), np.random.default_rng(0))
+    assert decision.effort.iterations == 200
+    assert decision.effort.seconds <= time.perf_counter() - started
+    regions = {alternative.region for alternative in decision.alternatives if alternative.region}
+    assert regions == {1, 2}
+    best = max(decision.alternatives, key=lambda alternative: alternative.value)
+    assert best.value == pytest.approx(decision.value)

@@ -69,6 +69,11 @@ class Scene:
             assert not over, f"no transition to {state} in:\n{self.service.said}"
             time.sleep(0.05)
 
+    def commands(self, after: Row, before: Row) -> list[str]:
+        """The commands that were journalled between two rows."""
+        rows = read_rows(self.journal, "command")
+        return [row.body["command"] for row in rows if after.seq < row.seq < before.seq]
+
     def searching(self) -> None:
         """Wait until the search has begun and a few waypoints are out."""
         self.reaches("SEARCHING")

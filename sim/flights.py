@@ -26,7 +26,6 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-
 NO_LIMITS = {
     "ROISEARCH_DEMO_ENDURANCE_MIN": "600",
     "ROISEARCH_FLIGHT_MAX_FLIGHT_S": "36000",

@@ -53,7 +53,7 @@ def test_a_waypoint_that_is_accepted_and_not_flown_holds_until_an_operator_resum
     with flight(tmp_path, flavor) as scene:
         scene.searching()
         scene.control.fault("not_flown")
-        scene.reaches("HOLDING", "waypoint")  # the target is not taken over, or no progress is made towards it
+        scene.reaches("HOLDING", "waypoint")  # not taken over, or no progress towards it
         scene.fly(20.0)
         assert scene.state() == "HOLDING"
         scene.control.clear("not_flown")

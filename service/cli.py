@@ -46,6 +46,7 @@ def parser() -> argparse.ArgumentParser:
         help="how much faster than real time the mock or simulator flies",
     )
     p.add_argument("--resume", metavar="RUN", type=Path, help="go on with the search of a run's folder")
+    p.add_argument("--schema", action="store_true", help="print the JSON Schema of a detector report")
     p.add_argument("--seed", metavar="S", type=int, help="seed of everything random (default: 1)")
     return p
 
@@ -53,6 +54,11 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the service; returns the exit code."""
     options = parser().parse_args(arguments)
+    if options.schema:
+        from service.reports import schema_text
+
+        print(schema_text(), end="")
+        return 0
     if (options.area is None) == (options.resume is None):
         print(
             "roisearch-service: give --area FILE, such as config/area.geojson, or --resume RUN",

@@ -10,7 +10,7 @@ decides the verdict; a later hit in the same pass turns a miss into a hit, and n
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
+from service.reports import Report
 
 HEADINGS = ("north", "east", "south", "west")
 Cell = tuple[int, int]
@@ -25,23 +26,52 @@ Cell = tuple[int, int]
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the aircraft was: degrees, metres above launch, nose in degrees from true north, seconds."""
+    """Where the aircraft was: degrees, metres above launch, seconds; nose from true north, up, and right wing
+    down, as `service.reports` says."""
 
     lat: float
     lon: float
     height_m: float
     heading_deg: float
     time: float
+    pitch_deg: float = 0.0
+    roll_deg: float = 0.0
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """The cells that a frame from one pose shows, int [k, 2], how well they are covered (0..1), and whether
-    that is enough for a look."""
+    """The cells that a frame shows, and what a look at each of them is worth.
+
+    cells int [k, 2]; covered float [k], the part of the cell that is in view (0..1); counts bool [k], whether that
+    is enough for a look; p_tp and p_tn float [k], the likelihoods of such a look.
+    """
 
     cells: NDArray[np.int64]
-    covered: float
-    counts: bool
+    covered: NDArray[np.float64]
+    counts: NDArray[np.bool_]
+    p_tp: NDArray[np.float64]
+    p_tn: NDArray[np.float64]
+
+    @classmethod
+    def alike(
+        cls, cells: NDArray[np.int64], *, covered: float, counts: bool, p_tp: float, p_tn: float
+    ) -> Footprint:
+        """A footprint with the same for every cell."""
+        k = len(cells)
+        return cls(cells, np.full(k, covered), np.full(k, counts), np.full(k, p_tp), np.full(k, p_tn))
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a sensor makes of one report: the cells that the frame shows, and for each cell with a hit the
+    likelihood ratio of it, P(hit | target there) / P(hit | target not there), above 0."""
+
+    footprint: Footprint
+    hits: Mapping[Cell, float]
+
+
+class Unreadable(ValueError):
+    """A report that the sensor can make nothing of; says why, for its sender."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +130,25 @@ class Sensor:
     min_covered: float
     height_m: float
 
+    def read(self, pose: Pose, report: Report) -> Reading:
+        """The evidence in a report of a frame taken from `pose`.
+
+        Raises:
+            Unreadable: the report says what this profile cannot interpret.
+        """
+        if report.footprint is not None or report.gimbal is not None:
+            given = "footprint" if report.footprint is not None else "gimbal"
+            raise Unreadable(f"the sensor profile fixes what a frame shows: it has no use for a {given}")
+        if any(detection.box is not None for detection in report.detections):
+            raise Unreadable(
+                "the sensor profile cannot place a pixel box; give the lat and lon of each detection"
+            )
+        footprint = self.footprint(pose)
+        return Reading(footprint, self._hits(report, footprint))
+
     def footprint(self, pose: Pose) -> Footprint:
         """The cells in view from `pose`; none when it is too low, off the grid or far between cells."""
-        nothing = Footprint(np.empty((0, 2), dtype=np.int64), 0.0, False)
+        nothing = self._alike(np.empty((0, 2), dtype=np.int64), 0.0)
         if pose.height_m < 0.7 * self.height_m:
             return nothing
         point = np.array([[pose.lat, pose.lon]])
@@ -115,10 +161,27 @@ class Sensor:
         spare = 0.5 * self.overlap / (1.0 - self.overlap)
         covered = float(np.prod(1.0 - np.clip(off - spare, 0.0, 1.0)))
         if covered < 0.5 * self.min_covered:
-            return Footprint(nothing.cells, covered, False)
+            return nothing
         heading = grid_heading(pose.heading_deg, self.frame.bearing_deg)
-        cells_in_view = self.fov.cells(cell, heading, self.frame.shape)
-        return Footprint(cells_in_view, covered, covered >= self.min_covered)
+        return self._alike(self.fov.cells(cell, heading, self.frame.shape), covered)
+
+    def _alike(self, cells: NDArray[np.int64], covered: float) -> Footprint:
+        counts = covered >= self.min_covered
+        return Footprint.alike(cells, covered=covered, counts=counts, p_tp=self.p_tp, p_tn=self.p_tn)
+
+    def _hits(self, report: Report, footprint: Footprint) -> dict[Cell, float]:
+        """The cells of the footprint that a detection lies in, or next to (its position is not exact)."""
+        hits: dict[Cell, float] = {}
+        if not report.detections or not len(footprint.cells):
+            return hits
+        cells, _ = self.frame.locate(np.array([[seen.lat, seen.lon] for seen in report.detections]))
+        for cell in cells:
+            gap = np.abs(footprint.cells - cell).max(axis=1)
+            nearest = int(gap.argmin())
+            if gap[nearest] <= 1:
+                row, col = footprint.cells[nearest]
+                hits[int(row), int(col)] = self.p_tp / (1.0 - self.p_tn)
+        return hits
 
 
 @dataclass
@@ -128,17 +191,18 @@ class Passes:
     verdict: dict[Cell, bool] = field(default_factory=dict)
 
     def look(
-        self, seen: Iterable[Cell], hits: set[Cell], counts: bool
+        self, seen: Iterable[tuple[Cell, bool]], hits: Mapping[Cell, float]
     ) -> tuple[list[Cell], list[Cell], list[Cell]]:
         """Take one frame in: returns the cells newly missed, newly hit, and turned from miss to hit.
 
-        A frame that does not count starts no pass; it only keeps those that go on.
+        `seen` tells for each cell in view whether it counts as a look; one that does not starts no pass, it only
+        keeps one that goes on.
         """
-        shown = list(seen)
+        shown = dict(seen)
         missed: list[Cell] = []
         hit: list[Cell] = []
         turned: list[Cell] = []
-        for cell in shown:
+        for cell, counts in shown.items():
             before = self.verdict.get(cell)
             if before is None:
                 if counts:
@@ -147,30 +211,45 @@ class Passes:
             elif not before and cell in hits:
                 turned.append(cell)
                 self.verdict[cell] = True
-        for cell in self.verdict.keys() - set(shown):
+        for cell in self.verdict.keys() - shown.keys():
             del self.verdict[cell]
         return missed, hit, turned
 
 
-def observe(sensor: Sensor, passes: Passes, footprint: Footprint, hits: set[Cell]) -> Observation | None:
+def observe(passes: Passes, reading: Reading) -> Observation | None:
     """The observation that a frame adds, or None when it adds nothing new.
 
-    Turning a miss into a hit multiplies the odds by (hit ratio / miss ratio): the same as a hit of a sensor
-    with p_tp' = p_tp * p_tn and 1 - p_tn' = (1 - p_tp) * (1 - p_tn).
+    A hit of likelihood ratio L is told to the belief as that of a sensor with the cell's p_tp and
+    1 - p_tn = p_tp / L. Turning a miss into a hit multiplies the odds by L / ((1 - p_tp) / p_tn).
     """
-    missed, hit, turned = passes.look(
-        ((row, col) for row, col in footprint.cells.tolist()), hits, footprint.counts
-    )
+    footprint, hits = reading.footprint, reading.hits
+    shown = [(row, col) for row, col in footprint.cells.tolist()]
+    missed, hit, turned = passes.look(zip(shown, footprint.counts.tolist(), strict=True), hits)
     cells = missed + hit + turned
     if not cells:
         return None
-    p_tp = [sensor.p_tp] * (len(missed) + len(hit)) + [sensor.p_tp * sensor.p_tn] * len(turned)
-    p_tn = [sensor.p_tn] * (len(missed) + len(hit))
-    p_tn += [1.0 - (1.0 - sensor.p_tp) * (1.0 - sensor.p_tn)] * len(turned)
+    at = [shown.index(cell) for cell in cells]
+    p_tp, p_tn = footprint.p_tp[at], footprint.p_tn[at]
+    for number in range(len(missed), len(cells)):
+        ratio = hits[cells[number]]
+        if number >= len(missed) + len(hit):
+            ratio *= p_tn[number] / (1.0 - p_tp[number])
+        p_tp[number], p_tn[number] = as_likelihoods(ratio, p_tp[number])
     return Observation(
         np.array(cells, dtype=np.int64),
         np.array([False] * len(missed) + [True] * (len(hit) + len(turned)), dtype=np.bool_),
-        np.array(p_tp),
-        np.array(p_tn),
+        p_tp,
+        p_tn,
         np.array([True] * (len(missed) + len(hit)) + [False] * len(turned), dtype=np.bool_),
     )
+
+
+def as_likelihoods(ratio: float, p_tp: float) -> tuple[float, float]:
+    """p_tp and p_tn of a sensor whose hit multiplies the odds by `ratio` > 0: p_tp / (1 - p_tn) = ratio.
+
+    The given p_tp is kept wherever it can be; a hit that says less than it (ratio <= p_tp) is told with
+    p_tp = p_tn = ratio / (1 + ratio), which has that ratio too.
+    """
+    if ratio > p_tp:
+        return p_tp, 1.0 - p_tp / ratio
+    return ratio / (1.0 + ratio), ratio / (1.0 + ratio)

@@ -12,10 +12,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from service.clock import Clock
-from service.evidence import Cell, Footprint, Observation, Passes, Pose, Sensor, observe
+from service.evidence import Observation, Passes, Pose, Sensor, Unreadable, observe
 from service.journal import Duplicate, Journal
 from service.reports import Receipt, Report
 from service.search import Search
@@ -52,21 +50,18 @@ class Intake:
             await self._pending[report.id].wait()
         if report.id in self._ids:
             return Receipt(id=report.id, status="duplicate")
-        pose = self._pose(report)
-        if pose is None:
+        try:
+            pose = self._pose(report)
+            reading = self.sensor.read(pose, report)
+        except Unreadable as why:
             self.refused += 1
-            reason = (
-                f"no position of the aircraft is known and trusted for captured_at {report.captured_at:.3f}"
-            )
-            return Receipt(id=report.id, status="refused", reason=reason)
+            return Receipt(id=report.id, status="refused", reason=str(why))
         written = self._pending[report.id] = asyncio.Event()
-        footprint = self.sensor.footprint(pose)
-        hits = self._hits(report, footprint)
         passes_before = dict(self.passes.verdict)
-        observation = observe(self.sensor, self.passes, footprint, hits) if report.usable else None
+        observation = observe(self.passes, reading) if report.usable else None
         body = {
             "report": report.model_dump(by_alias=True),
-            "pose": [pose.lat, pose.lon, pose.height_m, pose.heading_deg],
+            "pose": [pose.lat, pose.lon, pose.height_m, pose.heading_deg, pose.pitch_deg, pose.roll_deg],
             "observation": observation.to_dict() if observation else None,
         }
         try:
@@ -94,23 +89,19 @@ class Intake:
         """Ids that an earlier run of the same search has counted."""
         self._ids |= ids
 
-    def _pose(self, report: Report) -> Pose | None:
-        if report.pose is None:
-            return self.pose_at(report.captured_at)
-        own = report.pose
-        return Pose(own.lat, own.lon, own.height_m, own.heading_deg, report.captured_at)
-
-    def _hits(self, report: Report, footprint: Footprint) -> set[Cell]:
-        """The cells of the footprint that a detection lies in, or next to (its position is not exact)."""
-        if not report.detections or not len(footprint.cells):
-            return set()
-        points = np.array([[d.lat, d.lon] for d in report.detections])
-        cells, _ = self.sensor.frame.locate(points)
-        hits: set[Cell] = set()
-        for cell in cells:
-            gap = np.abs(footprint.cells - cell).max(axis=1)
-            nearest = int(gap.argmin())
-            if gap[nearest] <= 1:
-                row, col = footprint.cells[nearest]
-                hits.add((int(row), int(col)))
-        return hits
+    def _pose(self, report: Report) -> Pose:
+        """Where the frame was taken: as the report says, else as the telemetry of that time; raises Unreadable."""
+        own, when = report.pose, report.captured_at
+        if report.clock == "boot":
+            raise Unreadable("the autopilot's time since boot cannot be told in this service's clock")
+        known = self.pose_at(when)
+        if own is None:
+            if known is None:
+                raise Unreadable(
+                    f"no position of the aircraft is known and trusted for captured_at {when:.3f}"
+                )
+            return known
+        pitch, roll = (known.pitch_deg, known.roll_deg) if known else (0.0, 0.0)
+        pitch = own.pitch_deg if own.pitch_deg is not None else pitch
+        roll = own.roll_deg if own.roll_deg is not None else roll
+        return Pose(own.lat, own.lon, own.height_m, own.heading_deg, when, pitch, roll)

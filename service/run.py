@@ -214,7 +214,8 @@ class Service:
             pose = vehicle.pose_at(moment)
             if pose is None or not mission.helm.trust.trusted_at(moment):
                 return None
-            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment)
+            attitude = (pose.pitch_deg, pose.roll_deg)
+            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment, *attitude)
 
         def observed(observation: Observation, arrived: float) -> None:
             mission.observed(observation, arrived)

@@ -72,6 +72,8 @@ class RunView:
                 telemetry.alt_home_m,
                 telemetry.heading_deg,
                 telemetry.position_time,
+                telemetry.pitch_deg,
+                telemetry.roll_deg,
             )
         flown = mission.flight_time() if mission else 0.0
         return {
@@ -109,11 +111,13 @@ class RunView:
         footprint, frame = self.sensor.footprint(pose), self.search.grid.frame
         corners = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
         cells = []
-        for row, col in footprint.cells.tolist():
+        for (row, col), counts in zip(footprint.cells.tolist(), footprint.counts.tolist(), strict=True):
             points = frame.to_latlon(np.vstack([[[row, col]], np.array([row, col]) + corners])).tolist()
             centre, around = points[0], points[1:]
-            cells.append({"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around})
-        return {"counts": footprint.counts, "covered": footprint.covered, "cells": cells}
+            where = {"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around}
+            cells.append({**where, "counts": counts})
+        covered = float(footprint.covered.max(initial=0.0))
+        return {"counts": bool(footprint.counts.any()), "covered": covered, "cells": cells}
 
     def _flight_left(self, flown: float, battery: float | None) -> float | None:
         """Seconds until the battery reaches its limit at the consumption so far; None while unknown."""

@@ -6,6 +6,7 @@ import asyncio
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -100,3 +101,25 @@ def test_an_unusable_frame_is_no_evidence(make: Callable[..., Intake]) -> None:
     before = intake.search.belief.digest()
     assert asyncio.run(intake.submit(frame("a", usable=False))).looks == 0
     assert intake.search.belief.digest() == before
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"detections": [{"box": [1, 2, 3, 4]}]}, "cannot place a pixel box"),
+        ({"gimbal": {"pitch_deg": -30}}, "no use for a gimbal"),
+        ({"footprint": [[47.0, 8.0], [47.0, 8.1], [47.1, 8.0]]}, "no use for a footprint"),
+        ({"clock": "boot"}, "since boot"),
+    ],
+)
+def test_what_cannot_be_interpreted_is_refused_with_the_reason_and_not_ignored(
+    make: Callable[..., Intake], more: dict[str, Any], words: str
+) -> None:
+    intake = make()
+    before = intake.search.belief.digest()
+    report = Report.model_validate({"id": "a", "captured_at": 100.0, **more})
+    receipt = asyncio.run(intake.submit(report))
+    assert receipt.status == "refused"
+    assert words in receipt.reason
+    assert intake.search.belief.digest() == before
+    assert list(read_rows(intake.journal.path, "report")) == []

@@ -79,6 +79,7 @@ class SensorSettings(Section):
     cell_m: float | None = Field(default=None, gt=0.5, le=1000)
     p_tp: float = Field(default=0.9, gt=0, lt=1)
     p_tn: float = Field(default=0.9, gt=0, lt=1)
+    calibration_file: str = ""
     min_covered: float = Field(default=0.8, gt=0, le=1)
     silent_after_s: float = Field(default=10.0, gt=0)
 

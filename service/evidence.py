@@ -8,13 +8,14 @@ and high enough. How many looks the frames of the same ground are, `service.pass
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
+from service.calibration import Calibration
 from service.passes import Look, Passes
 from service.reports import Report
 
@@ -127,6 +128,7 @@ class Sensor:
     overlap: float
     min_covered: float
     height_m: float
+    calibration: Calibration | None = None
 
     def read(self, pose: Pose, report: Report) -> Reading:
         """The evidence in a report of a frame taken from `pose`.
@@ -142,7 +144,11 @@ class Sensor:
                 "the sensor profile cannot place a pixel box; give the lat and lon of each detection"
             )
         footprint = self.footprint(pose)
-        return Reading(footprint, self._hits(report, footprint))
+        hits = self._hits(report, footprint)
+        if self.calibration is not None and (looks := self.calibration.at(report.threshold)) is not None:
+            k = len(footprint.cells)
+            footprint = replace(footprint, p_tp=np.full(k, looks[0]), p_tn=np.full(k, looks[1]))
+        return Reading(footprint, hits)
 
     def footprint(self, pose: Pose) -> Footprint:
         """The cells in view from `pose`; none when it is too low, off the grid or far between cells."""
@@ -173,13 +179,17 @@ class Sensor:
         if not report.detections or not len(footprint.cells):
             return hits
         cells, _ = self.frame.locate(np.array([[seen.lat, seen.lon] for seen in report.detections]))
-        for cell in cells:
+        for cell, seen in zip(cells, report.detections, strict=True):
             gap = np.abs(footprint.cells - cell).max(axis=1)
             nearest = int(gap.argmin())
             if gap[nearest] <= 1:
-                row, col = footprint.cells[nearest]
-                hits[int(row), int(col)] = self.p_tp / (1.0 - self.p_tn)
+                row, col = (int(index) for index in footprint.cells[nearest])
+                hits[row, col] = max(self._ratio(seen.score), hits.get((row, col), 0.0))
         return hits
+
+    def _ratio(self, score: float) -> float:
+        """What a hit with this score is worth."""
+        return self.p_tp / (1.0 - self.p_tn) if self.calibration is None else self.calibration.ratio(score)
 
 
 def observe(passes: Passes, source: str, time: float, reading: Reading) -> Observation | None:

@@ -18,6 +18,7 @@ from typing import Any
 from rich.console import Console
 
 from service.area import Grid, SearchArea, build_grid, read_area, read_geotiff_prior
+from service.calibration import calibration_of
 from service.clock import Clock
 from service.config import Settings
 from service.demo import World
@@ -87,6 +88,7 @@ def _survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tup
     """The area and its grid, with what a person should know about them."""
     area = read_area(area_file, max_area_km2=settings.search.max_area_km2)
     grid = build_grid(area, cell_size(settings))
+    calibration_of(settings)  # a wrong table is told before anything starts
     if prior_file is not None:
         grid = grid.with_prior(read_geotiff_prior(prior_file, grid.frame, grid.covered))
     rows, cols = grid.frame.shape
@@ -173,6 +175,7 @@ class Service:
             overlap=settings.sensor.overlap,
             min_covered=settings.sensor.min_covered,
             height_m=settings.flight.altitude_m,
+            calibration=calibration_of(settings),
         )
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 

@@ -106,6 +106,14 @@ class HttpSettings(Section):
     body_timeout_s: float = Field(default=5.0, gt=0, le=300)
 
 
+class DoorSettings(Section):
+    udp: str = ""
+    unix: str = ""
+    mqtt: str = ""
+    mqtt_topic: str = "roisearch/reports"
+    mqtt_credentials_file: str = ""
+
+
 class RunSettings(Section):
     folder: str = "runs"
     seed: int = Field(default=1, ge=0)
@@ -124,6 +132,7 @@ class Settings(Section):
     sensor: SensorSettings = SensorSettings()
     search: SearchSettings = SearchSettings()
     http: HttpSettings = HttpSettings()
+    doors: DoorSettings = DoorSettings()
     run: RunSettings = RunSettings()
     demo: DemoSettings = DemoSettings()
 

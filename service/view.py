@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -42,11 +43,12 @@ class RunView:
         ):
             Gauge(name, about, registry=self.registry).set_function(value)
 
-    async def submit(self, report: Report) -> Receipt:
-        """A detector report from the door."""
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        """Detector reports from a door."""
         if self.intake is None:
-            return Receipt(id=report.id, status="refused", reason="the service is still starting")
-        return await self.intake.submit(report)
+            why = "the service is still starting"
+            return [Receipt(id=report.id, status="refused", reason=why) for report in reports]
+        return await self.intake.submit_all(reports)
 
     async def order(self, command: str) -> str:
         """An operator's order from the door."""

@@ -93,6 +93,7 @@ class Journal:
         if self._closed:
             raise RuntimeError("the journal is closed")
         entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
+        entry.done.set_running_or_notify_cancel()  # who stops waiting does not stop the row from being written
         self._queue.put(entry)
         return entry.done
 

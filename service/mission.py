@@ -423,7 +423,8 @@ class Mission:
             if why and not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
                 self.why_here += f"; {why}"
                 await self._write("yielded", {"reason": why})
-            if self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
+            told = not self.vehicle.events_waiting  # else why it landed may be among what is still to be read
+            if told and self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
                 why = f"landed before the search was over: {self.why_here}"
                 said = self._takeovers.said()  # often told only after the mode has changed
                 self.why_stopped = self.why_stopped or why + (said if said not in why else "")

@@ -152,6 +152,11 @@ class Vehicle:
         while (event := await self._queue.get()) is not None:
             yield event
 
+    @property
+    def events_waiting(self) -> bool:
+        """True while `telemetry` is ahead of what the reader of `events` has been told."""
+        return not self._queue.empty()
+
     async def wait_until(self, condition: Callable[[Telemetry], bool], timeout_s: float) -> bool:
         """Wait until what is known fulfils a condition; False if it did not in time."""
         return await self._until(lambda: condition(self._core.telemetry) or None, timeout_s) is not None

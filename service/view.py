@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ class RunView:
             ("roisearch_belief_entropy_bits", "Entropy of the belief", search.belief.entropy),
             ("roisearch_reports_accepted", "Detector reports taken in", lambda: self._reports()["accepted"]),
             ("roisearch_reports_refused", "Detector reports refused", lambda: self._reports()["refused"]),
+            ("roisearch_tasks", "Tasks of the event loop", lambda: len(asyncio.all_tasks())),
         ):
             Gauge(name, about, registry=self.registry).set_function(value)
 

@@ -61,6 +61,11 @@ class FlightSettings(Section):
     corner_m: float = Field(default=5.0, ge=1, le=50)
     takeoff: bool = False
     min_battery_percent: float = Field(default=20.0, ge=0, le=95)
+    reserve_percent: float = Field(default=15.0, ge=0, le=90)
+    max_airspeed_mps: float = Field(default=15.0, ge=2, le=40)
+    climb_mps: float = Field(default=2.0, ge=0.2, le=20)
+    descent_mps: float = Field(default=1.0, ge=0.2, le=20)
+    return_height_m: float = Field(default=60.0, ge=0, le=500)
     max_flight_s: float = Field(default=7200.0, gt=0)
     max_launch_distance_m: float = Field(default=20_000.0, gt=0)
     min_satellites: int = Field(default=6, ge=0, le=40)

@@ -164,6 +164,17 @@ class Helm:
         telemetry = self.vehicle.telemetry
         return telemetry.lat, telemetry.lon
 
+    def home(self) -> LatLon:
+        """Where the autopilot lands: its home in degrees as told, else the launch point of the area."""
+        home = self.vehicle.telemetry.home
+        return self.grid.launch if home is None else (home.lat, home.lon)
+
+    def under_way(self) -> bool:
+        """It flies to a waypoint, and is too far from it to brake for it."""
+        flight = self.settings.flight
+        braking = flight.speed_mps**2 / (2.0 * flight.deceleration_mps2) + flight.speed_mps
+        return self._target is not None and self.distance(self.here(), self._target) > braking
+
     def cell(self) -> tuple[Cell, bool]:
         """The cell under the aircraft (the nearest one when it is off the grid), and whether it is on it."""
         cells, inside = self.frame.locate(np.array([self.here()]))

@@ -21,9 +21,10 @@ from service.config import Settings
 from service.evidence import Observation
 from service.flight import Flight, Found, LatLon
 from service.helm import LEAST_PATIENCE_WALL_S, Helm
+from service.homeward import Homeward
 from service.intake import Intake, JournalLost
 from service.journal import Journal
-from service.limits import energy_objection, hold_objection
+from service.limits import hold_objection
 from service.mavlink import LinkError, Vehicle
 from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
@@ -85,6 +86,7 @@ class Mission:
         self._wake = asyncio.Event()
         self._group = asyncio.TaskGroup()
         self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
+        self.homeward = Homeward(self.helm, clock, fly)
 
     # ---- state -------------------------------------------------------------------------------------------
 
@@ -305,7 +307,7 @@ class Mission:
 
     def _energy_low(self) -> str:
         """Why the aircraft must fly home now, or nothing."""
-        return energy_objection(self.vehicle.telemetry, self.flight_time(), self.settings.flight)
+        return self.homeward.energy.objection(self.flight_time(), self.settings.flight)
 
     async def _stop_searching(self, event: Event) -> None:
         self.searched = True
@@ -360,7 +362,7 @@ class Mission:
     async def _go_home(self) -> None:
         """Fly home around what must not be flown over, then let the autopilot land."""
         if self.vehicle.telemetry.guided and not self._direct:
-            for point in self.helm.route(self.search.grid.launch)[:-1]:
+            for point in self.helm.route(self.helm.home())[:-1]:
                 if not await self._fly_to(point):
                     return
         await self._command(self.vehicle.return_to_launch(), "return to launch")
@@ -395,6 +397,7 @@ class Mission:
     async def _guard(self) -> None:
         """Ten times a second: can the position be trusted, is the waypoint flown, is there too much wind?"""
         while True:
+            self.homeward.update()
             trouble = self.helm.trouble(moving=self.state in MOVING)
             if trouble is not None and self.state in (*MOVING, State.HOLDING):
                 await self.hold(trouble.cause, trouble.reason)

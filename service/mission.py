@@ -192,7 +192,7 @@ class Mission:
         patience = self.settings.link.connect_timeout_s
         await self.vehicle.connect(patience)
         await self.vehicle.wait_until(lambda t: t.landed_state != "undefined", patience)
-        self.helm.altitude_m = self.vehicle.telemetry.home_alt_amsl_m + self.settings.flight.altitude_m
+        self.helm.begin()
         await self.happen(Event.LINKED, f"{self.vehicle.telemetry.autopilot} is ready")
         if self.may_take_off and self.helm.on_ground():
             await self._take_off()
@@ -381,14 +381,14 @@ class Mission:
     async def _fly_to(self, point: LatLon) -> bool:
         """Fly straight to a point; False when the state changed on the way."""
         state = self.state
-        sent = await self._send(point)
+        sent = await self._send(point, on_way=True)
         while self.state == state:
             if self.helm.distance(self.helm.here(), point) <= self.settings.flight.corner_m:
                 return True
             if not sent or self._resend:
                 await self.clock.sleep(RETRY_S)
                 self._resend = False
-                sent = self.state == state and await self._send(point)
+                sent = self.state == state and await self._send(point, on_way=True)
             await self._tick()
         return False
 
@@ -401,9 +401,9 @@ class Mission:
             trouble = self.helm.trouble(moving=self.state in MOVING)
             if trouble is not None and self.state in (*MOVING, State.HOLDING):
                 await self.hold(trouble.cause, trouble.reason)
-            if self.state in FLYING and (windy := self.helm.too_windy()):
-                self.why_stopped = windy
-                await self.happen(Event.RETURN, windy)
+            if self.state in FLYING and (why := self.helm.too_windy() or self.helm.strayed()):
+                self.why_stopped = why
+                await self.happen(Event.RETURN, why)
             await self.clock.sleep(TICK_S)
 
     async def _watch(self) -> None:
@@ -458,9 +458,9 @@ class Mission:
 
     # ---- commands ----------------------------------------------------------------------------------------
 
-    async def _send(self, point: LatLon) -> bool:
+    async def _send(self, point: LatLon, *, on_way: bool = False) -> bool:
         """Send the aircraft to a point; hold when something speaks against it. False when it was not sent."""
-        refusal = await self.helm.send(point)
+        refusal = await self.helm.send(point, on_way=on_way)
         if refusal is None:
             self.flight.waypoints += 1
         elif refusal.cause in ("position", "limits"):

@@ -69,18 +69,15 @@ _WAY = shapely.union_all([_AREA, _POND, shapely.Point(LAUNCH)]).convex_hull.buff
 _KEPT_OUT = _POND.buffer(-2.0)  # the service keeps 5 m; positions on the wire are as old as the wire is slow
 
 
-def why_not(here: LatLon, there: LatLon) -> str:
+def why_not(here: LatLon, there: LatLon, *, searching: bool) -> str:
     """Why an aircraft at one place must not be sent to another, or nothing."""
     start, end = shapely.Point(metres(here)), shapely.Point(metres(there))
     leg = shapely.LineString([start, end])
-    inside = bool(_SEARCH.contains(start))
-    zone, name = (
-        (_SEARCH, "the area") if inside and _SEARCH.contains(end) else (_WAY, "the way from and to it")
-    )
+    zone = _SEARCH if searching else _WAY
     if not zone.contains(end):
         return f"{end.distance(_AREA):.0f} m outside the area"
-    if _WAY.contains(start) and not zone.contains(leg):
-        return f"the leg leaves {name}"
+    if _WAY.contains(start) and not _WAY.contains(leg):
+        return "the leg leaves the way from and to the area"
     if leg.intersects(_KEPT_OUT) and not _POND.buffer(6.0).contains(start):
         return "the leg crosses the pond"
     if _KEPT_OUT.contains(end):

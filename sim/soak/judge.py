@@ -123,7 +123,8 @@ class Judge:
             if self._positions and min(_distance(here, there) for here in self._positions) > _NEAR_M:
                 found.append("a stop far away")
         else:
-            objections = [ground.why_not(here, there) for here in self._positions]
+            searching = self.state in ("SEARCHING", "CONFIRMING")
+            objections = [ground.why_not(here, there, searching=searching) for here in self._positions]
             if objections and all(objections):
                 found.append(objections[-1])
             height = message.z - ground.GROUND_AMSL_M

@@ -98,12 +98,21 @@ class Helm:
         self._target, self._on_way = point, on_way
         return None
 
-    async def hover(self) -> NotSent | None:
-        """Stop here. A stop is a waypoint too: none is sent while the position is not trusted."""
+    async def hover(self, *, wanted: Callable[[], bool]) -> NotSent | None:
+        """Stop here, if that is still `wanted` when it is sent."""
+        if not wanted():
+            return NotSent("state", "the mission is not to hold any more")
+        if doubts := self.doubts():
+            self.rest()
+            return NotSent("position", "; ".join(doubts))
+        await self._write("command", {"command": "hold"})
+        return self.stop() if wanted() else NotSent("state", "the mission is not to hold any more")
+
+    def stop(self) -> NotSent | None:
+        """Stop here, now. A stop is a waypoint too: none is sent while the position is not trusted."""
         self.rest()
         if doubts := self.doubts():
             return NotSent("position", "; ".join(doubts))
-        await self._write("command", {"command": "hold"})
         try:
             self.vehicle.hold()
         except LinkError as error:
@@ -111,7 +120,8 @@ class Helm:
         return None
 
     def rest(self) -> None:
-        """No waypoint is being flown any more."""
+        """No waypoint is being flown any more, nor sent again."""
+        self.vehicle.stand_by("the mission wants something else now")
         self._target = None
         self._progress.clear()
         self._straying.forget()

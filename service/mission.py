@@ -36,6 +36,8 @@ log = logging.getLogger("roisearch")
 TICK_S = 0.1
 RETRY_S = 1.0
 REFUSALS = 2  # so many waypoints in a row that are not flown are no bad luck
+LEAVING_S = 5.0
+_CRITICAL = 2  # MAV_SEVERITY
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 MOVING = (*FLYING, State.RETURNING)
 BLIND = {"link", "position"}  # causes of a hold during which the aircraft cannot be sent home either
@@ -117,8 +119,20 @@ class Mission:
     async def hold(self, cause: str, reason: str) -> None:
         """Hover until `cause` is gone; several causes can hold at once."""
         self._holds.add(cause)
-        if await self.happen(Event.HOLD, reason) and (refusal := await self.helm.hover()) is not None:
-            log.warning("no hold was sent: %s", refusal.reason)
+        if await self.happen(Event.HOLD, reason):
+            refusal = await self.helm.hover(wanted=lambda: self.state == State.HOLDING)
+            if refusal is not None:
+                log.warning("no hold was sent: %s", refusal.reason)
+
+    async def leave(self, reason: str) -> None:
+        """End the run where it is, for a fault that it cannot go on with: stop the aircraft if it is ours, and tell the
+        pilot, who has it now. Nothing is written: the journal may be what has failed."""
+        self.why_stopped, self.state = reason, State.ABORTED
+        self._drop_thought()
+        refusal = None if self.helm.on_ground() else self.helm.stop()
+        hovering = "" if refusal or self.helm.on_ground() else ", hovering"
+        if self.vehicle.status_text(f"search ABORTED{hovering}: {reason}", _CRITICAL):
+            await self.clock.sleep(LEAVING_S)  # a stop that is lost is sent again
 
     async def release(self, cause: str, reason: str) -> None:
         """`cause` no longer holds; the search goes on when nothing else does."""
@@ -397,6 +411,8 @@ class Mission:
     async def _guard(self) -> None:
         """Ten times a second: can the position be trusted, is the waypoint flown, is there too much wind?"""
         while True:
+            if self.journal.failed is not None:  # told to somebody else, who does not fly
+                raise self._journal_lost(self.journal.failed)
             self.homeward.update()
             trouble = self.helm.trouble(moving=self.state in MOVING)
             if trouble is not None and self.state in (*MOVING, State.HOLDING):
@@ -481,7 +497,10 @@ class Mission:
         try:
             await self.journal.append(self.clock.now(), kind, body)
         except (sqlite3.Error, OSError) as error:
-            raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
+            raise self._journal_lost(error) from error
+
+    def _journal_lost(self, error: Exception) -> JournalLost:
+        return JournalLost(f"the journal {self.journal.path} cannot be written: {error}")
 
     async def _decided(self, decision: Decision) -> None:
         self.flight.decisions += 1

@@ -87,7 +87,7 @@ def helm(**flight: Any) -> Helm:
         satellites=12,
         guided=True,
     )
-    vehicle = SimpleNamespace(telemetry=telemetry, settings=LinkSettings())
+    vehicle = SimpleNamespace(telemetry=telemetry, settings=LinkSettings(), stand_by=lambda reason: None)
     area = parse_area(json.dumps(ground.area()).encode(), source="field")
 
     async def write(kind: str, body: Mapping[str, object]) -> None:

@@ -61,7 +61,15 @@ class FlightSettings(Section):
     corner_m: float = Field(default=5.0, ge=1, le=50)
     takeoff: bool = False
     min_battery_percent: float = Field(default=20.0, ge=0, le=95)
+    reserve_percent: float = Field(default=15.0, ge=0, le=90)
+    max_airspeed_mps: float = Field(default=15.0, ge=2, le=40)
+    climb_mps: float = Field(default=2.0, ge=0.2, le=20)
+    descent_mps: float = Field(default=1.0, ge=0.2, le=20)
+    return_height_m: float = Field(default=60.0, ge=0, le=500)
     max_flight_s: float = Field(default=7200.0, gt=0)
+    margin_m: float = Field(default=30.0, ge=0, le=5000)
+    min_height_m: float = Field(default=3.0, ge=1, le=500)
+    max_height_m: float = Field(default=120.0, ge=5, le=500)
     max_launch_distance_m: float = Field(default=20_000.0, gt=0)
     min_satellites: int = Field(default=6, ge=0, le=40)
     max_jump_m: float = Field(default=10.0, gt=0)
@@ -206,6 +214,12 @@ def changed_settings(values: dict[str, Any], changed: Mapping[str, Any], where: 
             values.setdefault(section, {})[key] = value
             _check(values, f"--{key.replace('_', '-')}")
     settings = _check(values, where)
+    flight = settings.flight
+    if not flight.min_height_m <= flight.altitude_m <= flight.max_height_m:
+        raise BadInput(
+            f"{where}: 'flight.altitude_m' = {flight.altitude_m:g} is not between min_height_m = "
+            f"{flight.min_height_m:g} and max_height_m = {flight.max_height_m:g}; change one of them"
+        )
     if settings.link.speedup not in (None, 1.0) and settings.link.connect.startswith("serial"):
         raise BadInput(f"{settings.link.connect} is a real aircraft: it flies at a speedup of 1")
     return settings

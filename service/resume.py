@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from service.config import Settings, changed_settings
+from service.errors import BadInput
 from service.evidence import Observation
 from service.intake import Intake
 from service.journal import read_meta, read_rows
@@ -21,9 +22,14 @@ def replay(journal: Path, search: Search, intake: Intake) -> int:
     """Apply the journalled observations to a fresh search, in their order; returns how many reports there were."""
     ids = set()
     for row in read_rows(journal, "report"):
-        ids.add(row.body["report"]["id"])
-        if row.body["observation"] is not None:
-            search.apply(Observation.from_dict(row.body["observation"]))
+        try:
+            ids.add(row.body["report"]["id"])
+            if row.body["observation"] is not None:
+                search.apply(Observation.from_dict(row.body["observation"]))
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise BadInput(
+                f"{journal}: row {row.seq} is no report that this version knows ({error})"
+            ) from error
     intake.remember(ids)
     intake.accepted = len(ids)
     return len(ids)

@@ -204,7 +204,10 @@ class Service:
         report = run_report(self.view.mission, self.area.name, self.settings, began)
         if self.world is not None:
             report["simulated"] = simulated(self.world.target, self.view.mission, self.settings)
-        write_results(self.folder, self.view.mission, report, self.view.picture())
+        try:
+            write_results(self.folder, self.view.mission, report, self.view.picture())
+        except OSError as error:
+            log.error("%s: the results cannot be written (%s)", self.folder, error.strerror)
         return EXIT_CODES[report["outcome"]]
 
     def _assemble(self, vehicle: Vehicle, journal: Journal) -> Mission:
@@ -285,8 +288,7 @@ class Service:
         except* (LinkError, JournalLost) as group:
             for error in group.exceptions:
                 log.error("%s", error)
-            mission.why_stopped = str(group.exceptions[0])
-            mission.state = State.ABORTED
+            await mission.leave(str(group.exceptions[0]))
         except* asyncio.CancelledError:
             mission.why_stopped = "stopped by a signal"
             mission.state = State.ABORTED

@@ -4,6 +4,7 @@ A module has `main(arguments: list[str]) -> int`, which returns the exit code, a
 """
 
 COMMANDS = {
+    "export": "a run as geojson, kml, gpx, geotiff, plan, csv or html",
     "config": "check or show settings",
 }
 """Each word with what it does, for the help."""

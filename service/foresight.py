@@ -98,6 +98,8 @@ def foresee(
             if look():
                 stops.append(len(cells) - 1)
                 break
+            if pos[-1] >= until:
+                break
         told(flown, pos[-1])
     seconds = cell_seconds(cells, stops, cell_m, flight)
     return Foresight(tuple(cells), seconds, np.array(pos), alarms)

@@ -4,6 +4,7 @@ A module has `main(arguments: list[str]) -> int`, which returns the exit code, a
 """
 
 COMMANDS = {
+    "preview": "what a search of an area will be like, before flying",
     "export": "a run as geojson, kml, gpx, geotiff, plan, csv or html",
     "config": "check or show settings",
 }

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from service.area.frame import GridFrame
+from service.area.geotiff import POA_BAND
 from service.errors import BadInput
 from service.export.features import iso
 from service.export.run import Run
@@ -19,7 +20,7 @@ from service.export.wishes import Wishes
 
 NODATA = -1.0
 BANDS = (
-    ("POA", "probability of area: that the target is in the cell, now"),
+    (POA_BAND, "probability of area: that the target is in the cell, now"),
     ("POD", "probability of detection: that the looks so far would have found it there"),
     ("prior", "probability of area before the search"),
 )

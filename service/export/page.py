@@ -9,13 +9,16 @@ import base64
 import html
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from service.export.features import iso
 from service.export.gaps import Gap, find_gaps
 from service.export.pictures import WELL, draw_curve, draw_gaps, draw_map
-from service.export.run import Run
+from service.export.run import Detection, Run
 from service.export.wishes import Wishes
 
 MOST_ROWS = 100
+SAME_S = 30.0
 
 STYLE = """
 body { font: 16px/1.45 system-ui, sans-serif; color: #111; background: #fff; max-width: 60rem; margin: 1rem auto;
@@ -114,7 +117,7 @@ def _numbers(run: Run) -> str:
 
 
 def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
-    level = f"a POD below {wishes.pod_below:.0%} and at least {wishes.poa_above:g} times the probability of an average cell"
+    level = f"a POD below {wishes.pod_below:.0%} and {wishes.poa_above:g} times an average cell's probability or more"
     if not gaps:
         yield f"<p>There is no gap left: no ground has {level}.</p>"
     else:
@@ -146,19 +149,39 @@ def _what_was_found(run: Run) -> Iterable[str]:
         yield f"<p>The detector reported nothing at a place{hits}.</p>"
         return
     yield "<p>What the detector reported. A report alone is no find: detectors raise false alarms.</p>"
+    seen = sightings(run)
     rows = (
         (
-            _clock(each.time),
-            each.kind,
-            f"{each.score:.2f}",
-            f"{each.lat:.6f}, {each.lon:.6f}",
-            each.source,
-            "counted" if each.counted else "did not count: not over a cell that was looked at then",
+            _clock(each[0].time),
+            each[0].kind,
+            f"{max(one.score for one in each):.2f}",
+            f"{each[0].lat:.6f}, {each[0].lon:.6f}",
+            each[0].source,
+            f"{len(each)} frame" + ("s" if len(each) > 1 else ""),
+            "a hit on the map"
+            if any(one.counted for one in each)
+            else "not over ground that was being looked at",
         )
-        for each in run.detections[:MOST_ROWS]
+        for each in seen[:MOST_ROWS]
     )
-    yield _table(("time (UTC)", "class", "score", "place (lat, lon)", "detector", ""), rows)
-    yield _more(len(run.detections))
+    yield _table(("time (UTC)", "class", "score", "place (lat, lon)", "detector", "seen in", ""), rows)
+    yield _more(len(seen))
+
+
+def sightings(run: Run) -> list[list[Detection]]:
+    """Detections that are most likely the same thing, together: one class, within a cell, not long after each other."""
+    seen: list[list[Detection]] = []
+    for each in run.detections:
+        metres = run.frame.to_metres([(each.lat, each.lon), *((old[-1].lat, old[-1].lon) for old in seen)])
+        away = np.hypot(*(metres[1:] - metres[0]).T)
+        for old, distance in zip(reversed(seen), reversed(away), strict=True):
+            same = (old[-1].kind, old[-1].source) == (each.kind, each.source)
+            if same and distance <= run.frame.cell_m and each.time - old[-1].time <= SAME_S:
+                old.append(each)
+                break
+        else:
+            seen.append([each])
+    return seen
 
 
 def _words(run: Run) -> str:

@@ -30,8 +30,8 @@ from service.pace import climb_seconds, leg_seconds
 from service.search import Search
 
 log = logging.getLogger("roisearch")
-MOST_WAYPOINTS = 500
-"""Autopilots hold some 700 mission items; QGroundControl counts ours one by one."""
+MOST_WAYPOINTS = 480
+"""Turns of the path at most: an autopilot holds only so many items, and a person wants to look through them."""
 
 ENOUGH = 0.95
 """The mission ends when it would have found so much of what can be found."""
@@ -92,9 +92,7 @@ def mission_route(run: Run, wishes: Wishes) -> list[LatLon]:
         rng=np.random.default_rng(run.settings.run.seed),
         false_alarms=False,
     )
-    turns = turning_cells(seen.cells)[: MOST_WAYPOINTS - 20]
-    if not turns:
-        raise BadInput(f"{run.name}: the mission is too short for one waypoint; give more --minutes")
+    turns = turning_cells(seen.cells)[:MOST_WAYPOINTS]
     grid = run.grid
     path = [(float(lat), float(lon)) for lat, lon in grid.frame.to_latlon(np.array(turns))]
     there, home = way_home(grid, grid.launch, path[0]), way_home(grid, path[-1], grid.launch)
@@ -120,7 +118,13 @@ def _seconds(run: Run, wishes: Wishes) -> float:
     home = grid.frame.to_metres([grid.launch])[0]
     farthest = float(np.hypot(*(cells - home).T).max())
     most = flight.max_flight_s if wishes.minutes is None else 60.0 * wishes.minutes
-    return max(0.0, most - 2.0 * climb_seconds(flight) - 2.0 * leg_seconds(farthest, flight))
+    around = 2.0 * climb_seconds(flight) + 2.0 * leg_seconds(farthest, flight)
+    if most <= around:
+        raise BadInput(
+            f"{run.name}: {most / 60:g} minutes are too short: take-off, landing and the longest way there and home "
+            f"take {around / 60:.1f}; give more --minutes"
+        )
+    return most - around
 
 
 def _item(command: int, frame: int, params: list[float | None]) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def flown_numerically(length: float, flight: FlightSettings) -> float:
 
 @pytest.mark.parametrize("length", [5.0, 25.0, 42.0, 43.0, 300.0])
 def test_a_leg_takes_what_speeding_up_and_braking_take(length: float) -> None:
-    assert leg_seconds(length, FLIGHT) == pytest.approx(flown_numerically(length, FLIGHT), abs=0.1)
+    assert leg_seconds(length, FLIGHT) == pytest.approx(flown_numerically(length, FLIGHT), abs=0.2)
 
 
 def test_a_path_takes_as_long_as_its_legs() -> None:

@@ -224,13 +224,30 @@ def read_meta(path: Path, key: str) -> Any:
 
 
 def _open_to_read(path: Path) -> sqlite3.Connection:
+    """A reader beside the writer, if there is one: in WAL mode neither waits for the other."""
     if not path.is_file():
         raise BadInput(f"{path}: there is no journal here; give the folder of a run")
-    return sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+    address = path.resolve().as_uri()
+    database = sqlite3.connect(f"{address}?mode=ro", uri=True)
+    try:
+        database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except (
+        sqlite3.OperationalError
+    ):  # a finished run where nothing may be written, not even SQLite's own files
+        if path.with_name(path.name + "-wal").exists():
+            return database
+        database.close()
+        database = sqlite3.connect(f"{address}?mode=ro&immutable=1", uri=True)
+    except sqlite3.Error:
+        pass  # whoever reads is told
+    return database
 
 
 def read_rows(path: Path, *kinds: str) -> Iterator[Row]:
-    """The rows of a journal in order, of the given kinds or all; raises BadInput when it cannot be read."""
+    """The rows of a journal in order, of the given kinds or all, as they were when the first was read.
+
+    Raises BadInput when it cannot be read.
+    """
     database = _open_to_read(path)
     try:
         where = f"WHERE kind IN ({', '.join('?' * len(kinds))})" if kinds else ""

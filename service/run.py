@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import math
 import os
 import re
 import shutil
@@ -17,7 +16,7 @@ from typing import Any
 
 from rich.console import Console
 
-from service.area import Grid, SearchArea, build_grid, read_area, read_geotiff_prior
+from service.area import Grid, SearchArea
 from service.clock import Clock
 from service.config import Settings
 from service.demo import World
@@ -33,27 +32,19 @@ from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
 from service.search import Search
 from service.states import FINAL, State
+from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.view import RunView
 
 log = logging.getLogger("roisearch")
 EXIT_CODES = {"found": 0, "not_found": 3, "aborted": 4}
-AREA, PRIOR, JOURNAL = "area.geojson", "prior.tif", "journal.sqlite"
-
-
-def cell_size(settings: Settings) -> float:
-    """The cell size in metres: as given, else the footprint's shorter side less the overlap."""
-    if settings.sensor.cell_m is not None:
-        return settings.sensor.cell_m
-    angle = min(settings.sensor.horizontal_fov_deg, settings.sensor.vertical_fov_deg)
-    footprint = 2.0 * settings.flight.altitude_m * math.tan(math.radians(angle / 2.0))
-    return round(footprint * (1.0 - settings.sensor.overlap), 1)
 
 
 def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     """Run a search from its area file to the ground; returns the exit code. Raises BadInput before it starts."""
     console = Console()
     set_up_logging(console)
-    area, grid = _survey(area_file, prior_file, settings)
+    area, grid = survey(area_file, prior_file, settings)
+    _tell(area, grid)
     signing_key = _signing_key(settings)
     with contextlib.closing(open_door(settings.http, os.environ)) as door:
         folder = _new_folder(Path(settings.run.folder), area.name)
@@ -72,7 +63,8 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
     set_up_logging(console)
     settings = stored_settings(folder / JOURNAL, changed)
     prior_file = folder / PRIOR
-    area, grid = _survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
+    area, grid = survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
+    _tell(area, grid)
     signing_key = _signing_key(settings)
     with contextlib.closing(open_door(settings.http, os.environ)) as door:
         journal = Journal(folder / JOURNAL)
@@ -83,18 +75,13 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
         return _search(area, grid, settings, folder, journal, door, signing_key, console)
 
 
-def _survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tuple[SearchArea, Grid]:
-    """The area and its grid, with what a person should know about them."""
-    area = read_area(area_file, max_area_km2=settings.search.max_area_km2)
-    grid = build_grid(area, cell_size(settings))
-    if prior_file is not None:
-        grid = grid.with_prior(read_geotiff_prior(prior_file, grid.frame, grid.covered))
+def _tell(area: SearchArea, grid: Grid) -> None:
+    """What a person should know about the area and its grid."""
     rows, cols = grid.frame.shape
     log.info("area: %s, %d cells of %g m to search", area.name, grid.searchable.sum(), grid.frame.cell_m)
     log.info("grid: %d x %d, turned to %.0f° true", rows, cols, grid.frame.bearing_deg)
     for note in grid.notes:
         log.info("note: %s", note)
-    return area, grid
 
 
 def _signing_key(settings: Settings) -> bytes | None:

@@ -89,6 +89,7 @@ class SensorSettings(Section):
     cell_m: float | None = Field(default=None, gt=0.5, le=1000)
     p_tp: float = Field(default=0.9, gt=0, lt=1)
     p_tn: float = Field(default=0.9, gt=0, lt=1)
+    calibration_file: str = ""
     min_covered: float = Field(default=0.8, gt=0, le=1)
     silent_after_s: float = Field(default=10.0, gt=0)
 
@@ -115,6 +116,14 @@ class HttpSettings(Section):
     body_timeout_s: float = Field(default=5.0, gt=0, le=300)
 
 
+class DoorSettings(Section):
+    udp: str = ""
+    unix: str = ""
+    mqtt: str = ""
+    mqtt_topic: str = "roisearch/reports"
+    mqtt_credentials_file: str = ""
+
+
 class RunSettings(Section):
     folder: str = "runs"
     seed: int = Field(default=1, ge=0)
@@ -133,6 +142,7 @@ class Settings(Section):
     sensor: SensorSettings = SensorSettings()
     search: SearchSettings = SearchSettings()
     http: HttpSettings = HttpSettings()
+    doors: DoorSettings = DoorSettings()
     run: RunSettings = RunSettings()
     demo: DemoSettings = DemoSettings()
 

@@ -16,7 +16,7 @@ import queue
 import sqlite3
 import threading
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,7 +70,7 @@ class Journal:
         self.path = path
         self.failed: Exception | None = None
         """The first write that did not succeed."""
-        self._queue: queue.SimpleQueue[_Entry | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[list[_Entry] | None] = queue.SimpleQueue()
         self._closed = False
         self._last = 0
         try:
@@ -123,16 +123,37 @@ class Journal:
 
     def write(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> Future[int]:
         """Queue a row; the future holds its number once it is on disk, or raises Duplicate."""
+        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
+        self._enqueue([entry])
+        return entry.done
+
+    def _enqueue(self, entries: list[_Entry]) -> None:
+        """Queue rows that are written in one transaction: all of them, or none."""
         if self._closed:
             raise RuntimeError("the journal is closed")
-        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
-        entry.done.set_running_or_notify_cancel()  # who stops waiting does not stop the row from being written
-        self._queue.put(entry)
-        return entry.done
+        for entry in entries:
+            entry.done.set_running_or_notify_cancel()  # who stops waiting does not stop the row from being written
+        self._queue.put(entries)
 
     async def append(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> int:
         """Write a row and return its number once it is on disk; raises Duplicate when `key` is known."""
         return await asyncio.wrap_future(self.write(time, kind, body, key))
+
+    async def append_all(self, rows: Sequence[tuple[float, str, str, str]]) -> list[bool]:
+        """Write rows of (time, kind, key, body as JSON) in one transaction; returns when they are on disk.
+
+        Returns for each whether it is new; raises what kept them from being written, and then none is.
+        """
+        entries = [_Entry(time, kind, key, body, Future()) for time, kind, key, body in rows]
+        if not entries:
+            return []
+        self._enqueue(entries)
+        await asyncio.wait([asyncio.wrap_future(entries[-1].done)])  # the outcomes come in their order
+        failures = [entry.done.exception() for entry in entries]
+        for failure in failures:
+            if failure is not None and not isinstance(failure, Duplicate):
+                raise failure
+        return [failure is None for failure in failures]
 
     def close(self) -> None:
         """Write what is queued, then close the file."""
@@ -150,7 +171,7 @@ class Journal:
             while not self._queue.empty():
                 batch.append(self._queue.get())
             open_ = None not in batch
-            self._commit([entry for entry in batch if entry is not None])
+            self._commit([entry for entries in batch if entries is not None for entry in entries])
 
     def _commit(self, entries: list[_Entry]) -> None:
         outcomes: list[tuple[_Entry, int | Exception]] = []

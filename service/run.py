@@ -10,6 +10,7 @@ import re
 import shutil
 import signal
 import time
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,11 @@ from typing import Any
 from rich.console import Console
 
 from service.area import Grid, SearchArea
+from service.calibration import calibration_of
 from service.clock import Clock
 from service.config import Settings
 from service.demo import World
+from service.doors import Doors, open_doors
 from service.errors import BadInput
 from service.evidence import Observation, Pose, Sensor
 from service.http import Door, open_door
@@ -45,8 +48,9 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     set_up_logging(console)
     area, grid = survey(area_file, prior_file, settings)
     _tell(area, grid)
+    calibration_of(settings)  # a wrong table is told before anything starts
     signing_key = _signing_key(settings)
-    with contextlib.closing(open_door(settings.http, os.environ)) as door:
+    with _open(settings) as (door, doors):
         folder = _new_folder(Path(settings.run.folder), area.name)
         shutil.copyfile(area_file, folder / AREA)
         if prior_file is not None:
@@ -54,7 +58,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
         journal = Journal(folder / JOURNAL)
         journal.set_meta("grid", grid.frame.to_dict())
         journal.set_meta("settings", settings.model_dump())
-        return _search(area, grid, settings, folder, journal, door, signing_key, console)
+        return _search(area, grid, settings, folder, journal, door, doors, signing_key, console)
 
 
 def resume(folder: Path, changed: dict[str, Any]) -> int:
@@ -65,14 +69,25 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
     prior_file = folder / PRIOR
     area, grid = survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
     _tell(area, grid)
+    calibration_of(settings)  # a wrong table is told before anything starts
     signing_key = _signing_key(settings)
-    with contextlib.closing(open_door(settings.http, os.environ)) as door:
+    with _open(settings) as (door, doors):
         journal = Journal(folder / JOURNAL)
         if journal.meta("grid") != grid.frame.to_dict():
             raise BadInput(
                 f"{folder}: its journal is of another grid than its area file makes; resume it unchanged"
             )
-        return _search(area, grid, settings, folder, journal, door, signing_key, console)
+        return _search(area, grid, settings, folder, journal, door, doors, signing_key, console)
+
+
+@contextlib.contextmanager
+def _open(settings: Settings) -> Iterator[tuple[Door, Doors]]:
+    """Take every address before anything starts, and give them up at the end; raises BadInput."""
+    with (
+        contextlib.closing(open_door(settings.http, os.environ)) as door,
+        contextlib.closing(open_doors(settings.doors)) as doors,
+    ):
+        yield door, doors
 
 
 def _tell(area: SearchArea, grid: Grid) -> None:
@@ -102,6 +117,7 @@ def _search(
     folder: Path,
     journal: Journal,
     door: Door,
+    doors: Doors,
     signing_key: bytes | None,
     console: Console,
 ) -> int:
@@ -111,7 +127,7 @@ def _search(
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
         service = Service(area, search, settings, folder, console)
-        return asyncio.run(service.fly(door, journal, signing_key))
+        return asyncio.run(service.fly(door, doors, journal, signing_key))
     finally:
         journal.close()
 
@@ -160,15 +176,17 @@ class Service:
             overlap=settings.sensor.overlap,
             min_covered=settings.sensor.min_covered,
             height_m=settings.flight.altitude_m,
+            calibration=calibration_of(settings),
         )
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 
-    async def fly(self, door: Door, journal: Journal, signing_key: bytes | None) -> int:
+    async def fly(self, door: Door, doors: Doors, journal: Journal, signing_key: bytes | None) -> int:
         """Start everything, fly, and write the results; returns the exit code."""
         began = time.time()
         door, guest_token = door.with_guest()
         server = door.server(self.view)
         serving = asyncio.create_task(server.run_until_told())
+        listening = asyncio.create_task(doors.serve(self.view.submit_all))
         try:
             connect = await self._start_world()
             link = self._link_settings(signing_key)
@@ -183,6 +201,8 @@ class Service:
         finally:
             await asyncio.sleep(0.3 if self.world is not None else 0.0)  # let the detector read the end
             server.should_exit = True
+            listening.cancel()
+            await asyncio.wait([listening])
             await serving
             if self.world is not None:
                 await self.world.stop()
@@ -204,12 +224,15 @@ class Service:
             pose = vehicle.pose_at(moment)
             if pose is None or not mission.helm.trust.trusted_at(moment):
                 return None
-            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment)
+            attitude = (pose.pitch_deg, pose.roll_deg)
+            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment, *attitude)
 
         def observed(observation: Observation, arrived: float) -> None:
             mission.observed(observation, arrived)
 
-        intake = Intake(self.search, self.sensor, journal, self.clock, pose_at, observed)
+        intake = Intake(
+            self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
+        )
         mission = Mission(
             settings=self.settings,
             clock=self.clock,

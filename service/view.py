@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -44,11 +45,12 @@ class RunView:
         ):
             Gauge(name, about, registry=self.registry).set_function(value)
 
-    async def submit(self, report: Report) -> Receipt:
-        """A detector report from the door."""
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        """Detector reports from a door."""
         if self.intake is None:
-            return Receipt(id=report.id, status="refused", reason="the service is still starting")
-        return await self.intake.submit(report)
+            why = "the service is still starting"
+            return [Receipt(id=report.id, status="refused", reason=why) for report in reports]
+        return await self.intake.submit_all(reports)
 
     async def order(self, command: str) -> str:
         """An operator's order from the door."""
@@ -74,6 +76,8 @@ class RunView:
                 telemetry.alt_home_m,
                 telemetry.heading_deg,
                 telemetry.position_time,
+                telemetry.pitch_deg,
+                telemetry.roll_deg,
             )
         flown = mission.flight_time() if mission else 0.0
         return {
@@ -111,11 +115,13 @@ class RunView:
         footprint, frame = self.sensor.footprint(pose), self.search.grid.frame
         corners = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
         cells = []
-        for row, col in footprint.cells.tolist():
+        for (row, col), counts in zip(footprint.cells.tolist(), footprint.counts.tolist(), strict=True):
             points = frame.to_latlon(np.vstack([[[row, col]], np.array([row, col]) + corners])).tolist()
             centre, around = points[0], points[1:]
-            cells.append({"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around})
-        return {"counts": footprint.counts, "covered": footprint.covered, "cells": cells}
+            where = {"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around}
+            cells.append({**where, "counts": counts})
+        covered = float(footprint.covered.max(initial=0.0))
+        return {"counts": bool(footprint.counts.any()), "covered": covered, "cells": cells}
 
     def _flight_left(self, flown: float) -> float | None:
         """Seconds until the way home must begin, for the battery or the time; None while unknown."""

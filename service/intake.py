@@ -13,10 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from service.clock import Clock
-from service.evidence import Observation, Passes, Pose, Sensor, Unreadable, observe
+from service.evidence import Observation, Passes, Pose, Unreadable, observe
 from service.journal import Duplicate, Journal
 from service.reports import Receipt, Report
 from service.search import Search
+from service.sensors import Profile
 
 PoseAt = Callable[[float], Pose | None]
 
@@ -31,7 +32,7 @@ class Intake:
     applied observation with the time (perf_counter) at which its report arrived."""
 
     search: Search
-    sensor: Sensor
+    sensor: Profile
     journal: Journal
     clock: Clock
     pose_at: PoseAt

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import math
 import os
 import re
 import shutil
@@ -22,7 +21,7 @@ from service.clock import Clock
 from service.config import Settings
 from service.demo import World
 from service.errors import BadInput
-from service.evidence import Observation, Pose, Sensor
+from service.evidence import Observation, Pose
 from service.http import Door, open_door
 from service.intake import Intake, JournalLost
 from service.journal import Journal
@@ -32,21 +31,13 @@ from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
 from service.search import Search
+from service.sensors import Profile, cell_size, make_sensor
 from service.states import FINAL, State
 from service.view import RunView
 
 log = logging.getLogger("roisearch")
 EXIT_CODES = {"found": 0, "not_found": 3, "aborted": 4}
 AREA, PRIOR, JOURNAL = "area.geojson", "prior.tif", "journal.sqlite"
-
-
-def cell_size(settings: Settings) -> float:
-    """The cell size in metres: as given, else the footprint's shorter side less the overlap."""
-    if settings.sensor.cell_m is not None:
-        return settings.sensor.cell_m
-    angle = min(settings.sensor.horizontal_fov_deg, settings.sensor.vertical_fov_deg)
-    footprint = 2.0 * settings.flight.altitude_m * math.tan(math.radians(angle / 2.0))
-    return round(footprint * (1.0 - settings.sensor.overlap), 1)
 
 
 def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
@@ -121,9 +112,10 @@ def _search(
     """Compile the planner and fly."""
     try:
         search = Search(grid, settings)
+        sensor = make_sensor(settings, grid, search.fov)
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
-        service = Service(area, search, settings, folder, console)
+        service = Service(area, search, sensor, settings, folder, console)
         return asyncio.run(service.fly(door, journal, signing_key))
     finally:
         journal.close()
@@ -159,21 +151,19 @@ class Service:
     """A search from its first process to the last file it leaves."""
 
     def __init__(
-        self, area: SearchArea, search: Search, settings: Settings, folder: Path, console: Console
+        self,
+        area: SearchArea,
+        search: Search,
+        sensor: Profile,
+        settings: Settings,
+        folder: Path,
+        console: Console,
     ) -> None:
         self.area, self.search, self.settings = area, search, settings
         self.folder, self.console = folder, console
         self.clock = Clock(settings.speedup)
         self.world: World | None = None
-        self.sensor = Sensor(
-            frame=search.grid.frame,
-            fov=search.fov,
-            p_tp=settings.sensor.p_tp,
-            p_tn=settings.sensor.p_tn,
-            overlap=settings.sensor.overlap,
-            min_covered=settings.sensor.min_covered,
-            height_m=settings.flight.altitude_m,
-        )
+        self.sensor = sensor
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 
     async def fly(self, door: Door, journal: Journal, signing_key: bytes | None) -> int:

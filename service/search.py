@@ -15,19 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch import Belief, Decision, FieldOfView, Regions, SearchState, make_planner, segment_regions
+from roisearch import Belief, Decision, Regions, SearchState, make_planner, segment_regions
 from roisearch.detection import DetectionRecord
 from roisearch.place import Place, most_likely_place
 from service.area import Grid
 from service.config import Settings
 from service.evidence import Observation
+from service.sensors import field_of_view
 
 Cell = tuple[int, int]
-FIELDS_OF_VIEW: dict[str, Callable[[], FieldOfView]] = {
-    "point": FieldOfView.point,
-    "donut": FieldOfView.donut,
-    "wide-angle": FieldOfView.wide_angle,
-}
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,7 @@ class Search:
         self.belief = Belief(grid.prior, searchable=grid.searchable, outside=grid.outside)
         self.record = DetectionRecord(grid.prior, grid.outside)
         self.regions: Regions = segment_regions(self.belief.probability(), searchable=grid.searchable)
-        self.fov = FIELDS_OF_VIEW[settings.sensor.profile]()
+        self.fov = field_of_view(settings, grid.frame.cell_m)
         self.planner = make_planner(
             settings.search.planner, fov=self.fov, flyable=grid.flyable, regions=self.regions
         )

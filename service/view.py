@@ -10,11 +10,12 @@ from prometheus_client import CollectorRegistry, Gauge, Histogram
 from service.area import SearchArea
 from service.clock import Clock
 from service.config import Settings
-from service.evidence import Pose, Sensor
+from service.evidence import Pose
 from service.intake import Intake
 from service.mission import Mission
 from service.reports import Receipt, Report
 from service.search import Search
+from service.sensors import Profile
 from service.states import FINAL, State
 
 
@@ -22,7 +23,7 @@ class RunView:
     """What can be seen of a run; `mission` and `intake` are there once the link is open."""
 
     def __init__(
-        self, area: SearchArea, search: Search, sensor: Sensor, settings: Settings, clock: Clock
+        self, area: SearchArea, search: Search, sensor: Profile, settings: Settings, clock: Clock
     ) -> None:
         self.area, self.search, self.sensor, self.settings, self.clock = area, search, sensor, settings, clock
         self.mission: Mission | None = None

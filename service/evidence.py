@@ -2,22 +2,20 @@
 
 A frame shows the cells of the field of view around the aircraft at the moment of capture. It counts as a look
 only when the aircraft was well enough centred on its cell for the footprint to cover the cells (`covered`),
-and high enough. Frames of the same ground seconds apart are not independent looks, so a cell is looked at once
-per *pass*: a pass begins with the first frame that covers the cell well (`min_covered`) and ends when a frame
-covers less than half of that, so that hovering at the limit does not make many passes of one. The first frame
-decides the verdict; a later hit in the same pass turns a miss into a hit, and never the reverse.
+and high enough. How many looks the frames of the same ground are, `service.passes` decides.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
+from service.passes import Look, Passes
 from service.reports import Report
 
 HEADINGS = ("north", "east", "south", "west")
@@ -63,7 +61,7 @@ class Footprint:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a sensor makes of one report: the cells that the frame shows, and for each cell with a hit the
+    """What a sensor makes of one report: the cells that the frame shows, and for each of them with a hit the
     likelihood ratio of it, P(hit | target there) / P(hit | target not there), above 0."""
 
     footprint: Footprint
@@ -78,7 +76,7 @@ class Unreadable(ValueError):
 class Observation:
     """What one report says about the ground: cells int [k, 2], hits bool [k], with their likelihoods [k].
 
-    `first` bool [k] is False where a miss of the same pass turned into a hit: that is not another look.
+    `first` bool [k] is False where a look of the same pass turned into a hit: that is not another look.
     """
 
     cells: NDArray[np.int64]
@@ -184,72 +182,20 @@ class Sensor:
         return hits
 
 
-@dataclass
-class Passes:
-    """Which cells are in the middle of a pass, and the verdict it has so far."""
-
-    verdict: dict[Cell, bool] = field(default_factory=dict)
-
-    def look(
-        self, seen: Iterable[tuple[Cell, bool]], hits: Mapping[Cell, float]
-    ) -> tuple[list[Cell], list[Cell], list[Cell]]:
-        """Take one frame in: returns the cells newly missed, newly hit, and turned from miss to hit.
-
-        `seen` tells for each cell in view whether it counts as a look; one that does not starts no pass, it only
-        keeps one that goes on.
-        """
-        shown = dict(seen)
-        missed: list[Cell] = []
-        hit: list[Cell] = []
-        turned: list[Cell] = []
-        for cell, counts in shown.items():
-            before = self.verdict.get(cell)
-            if before is None:
-                if counts:
-                    (hit if cell in hits else missed).append(cell)
-                    self.verdict[cell] = cell in hits
-            elif not before and cell in hits:
-                turned.append(cell)
-                self.verdict[cell] = True
-        for cell in self.verdict.keys() - shown.keys():
-            del self.verdict[cell]
-        return missed, hit, turned
-
-
-def observe(passes: Passes, reading: Reading) -> Observation | None:
-    """The observation that a frame adds, or None when it adds nothing new.
-
-    A hit of likelihood ratio L is told to the belief as that of a sensor with the cell's p_tp and
-    1 - p_tn = p_tp / L. Turning a miss into a hit multiplies the odds by L / ((1 - p_tp) / p_tn).
-    """
-    footprint, hits = reading.footprint, reading.hits
-    shown = [(row, col) for row, col in footprint.cells.tolist()]
-    missed, hit, turned = passes.look(zip(shown, footprint.counts.tolist(), strict=True), hits)
-    cells = missed + hit + turned
-    if not cells:
+def observe(passes: Passes, source: str, time: float, reading: Reading) -> Observation | None:
+    """The observation that a source's frame of that time adds, or None when it adds nothing new."""
+    footprint = reading.footprint
+    looks: dict[Cell, Look] = {}
+    columns = (footprint.cells, footprint.counts, footprint.p_tp, footprint.p_tn)
+    for (row, col), counts, p_tp, p_tn in zip(*(column.tolist() for column in columns), strict=True):
+        looks[row, col] = Look(counts, p_tp, p_tn, reading.hits.get((row, col)))
+    changes = passes.take(source, time, looks)
+    if not changes:
         return None
-    at = [shown.index(cell) for cell in cells]
-    p_tp, p_tn = footprint.p_tp[at], footprint.p_tn[at]
-    for number in range(len(missed), len(cells)):
-        ratio = hits[cells[number]]
-        if number >= len(missed) + len(hit):
-            ratio *= p_tn[number] / (1.0 - p_tp[number])
-        p_tp[number], p_tn[number] = as_likelihoods(ratio, p_tp[number])
     return Observation(
-        np.array(cells, dtype=np.int64),
-        np.array([False] * len(missed) + [True] * (len(hit) + len(turned)), dtype=np.bool_),
-        p_tp,
-        p_tn,
-        np.array([True] * (len(missed) + len(hit)) + [False] * len(turned), dtype=np.bool_),
+        np.array([change.cell for change in changes], dtype=np.int64),
+        np.array([change.hit for change in changes], dtype=np.bool_),
+        np.array([change.p_tp for change in changes]),
+        np.array([change.p_tn for change in changes]),
+        np.array([change.first for change in changes], dtype=np.bool_),
     )
-
-
-def as_likelihoods(ratio: float, p_tp: float) -> tuple[float, float]:
-    """p_tp and p_tn of a sensor whose hit multiplies the odds by `ratio` > 0: p_tp / (1 - p_tn) = ratio.
-
-    The given p_tp is kept wherever it can be; a hit that says less than it (ratio <= p_tp) is told with
-    p_tp = p_tn = ratio / (1 + ratio), which has that ratio too.
-    """
-    if ratio > p_tp:
-        return p_tp, 1.0 - p_tp / ratio
-    return ratio / (1.0 + ratio), ratio / (1.0 + ratio)

@@ -12,7 +12,7 @@ import json
 import queue
 import sqlite3
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,15 +90,31 @@ class Journal:
 
     def write(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> Future[int]:
         """Queue a row; the future holds its number once it is on disk, or raises Duplicate."""
+        return self._enqueue(_Entry(time, kind, key, json.dumps(dict(body)), Future()))
+
+    def _enqueue(self, entry: _Entry) -> Future[int]:
         if self._closed:
             raise RuntimeError("the journal is closed")
-        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
         self._queue.put(entry)
         return entry.done
 
     async def append(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> int:
         """Write a row and return its number once it is on disk; raises Duplicate when `key` is known."""
         return await asyncio.wrap_future(self.write(time, kind, body, key))
+
+    async def append_all(self, rows: Sequence[tuple[float, str, str, str]]) -> list[bool]:
+        """Write rows of (time, kind, key, body as JSON) and wait once, until all are on disk.
+
+        Returns for each whether it is new; raises what kept one of them from being written.
+        """
+        futures = [self._enqueue(_Entry(time, kind, key, body, Future())) for time, kind, key, body in rows]
+        if futures:
+            await asyncio.wait([asyncio.wrap_future(futures[-1])])  # the writer keeps to their order
+        failures = [future.exception() for future in futures]
+        for failure in failures:
+            if failure is not None and not isinstance(failure, Duplicate):
+                raise failure
+        return [failure is None for failure in failures]
 
     def close(self) -> None:
         """Write what is queued, then close the file."""

@@ -327,7 +327,7 @@ class Mission:
             await self._decided(decision)
         thinking_s = self.settings.search.deadline_s * self.clock.speedup
         if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
-            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes.verdict]
+            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes]
             self._thinking = asyncio.create_task(
                 self.search.decide(navigator.waypoint, navigator.heading, unseen)
             )

@@ -210,7 +210,9 @@ class Service:
         def observed(observation: Observation, arrived: float) -> None:
             mission.observed(observation, arrived)
 
-        intake = Intake(self.search, self.sensor, journal, self.clock, pose_at, observed)
+        intake = Intake(
+            self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
+        )
         mission = Mission(
             settings=self.settings,
             clock=self.clock,

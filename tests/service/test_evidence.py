@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Collection
 
@@ -12,8 +13,10 @@ from hypothesis import strategies as st
 
 from roisearch import Belief, FieldOfView
 from service.area import GridFrame
-from service.evidence import Footprint, Observation, Passes, Pose, Reading, Sensor, grid_heading, observe
+from service.evidence import Footprint, Observation, Pose, Reading, Sensor, grid_heading, observe
+from service.passes import Passes
 
+CLOCK = itertools.count(100.0, 1.0 / 30.0)
 FRAME = GridFrame(47.05, 8.30, 0.0, 25.0, 20, 30, -375.0, 250.0)
 
 
@@ -37,8 +40,9 @@ def pose(row: float, col: float, height: float = 30.0, heading: float = 0.0) -> 
 def look(
     s: Sensor, passes: Passes, where: Pose, hits: Collection[tuple[int, int]] = ()
 ) -> Observation | None:
-    """One frame; a hit has the profile's likelihood ratio."""
-    return observe(passes, Reading(s.footprint(where), dict.fromkeys(hits, 0.9 / (1.0 - 0.8))))
+    """The next frame; a hit has the profile's likelihood ratio."""
+    reading = Reading(s.footprint(where), dict.fromkeys(hits, 0.9 / (1.0 - 0.8)))
+    return observe(passes, "camera", next(CLOCK), reading)
 
 
 def test_a_frame_over_a_cells_centre_is_a_look_at_it() -> None:
@@ -125,7 +129,9 @@ def test_looks_are_at_most_one_per_visit(frames: list[tuple[int, bool, bool]]) -
     for col, counts, hit in frames:
         covered = 1.0 if counts else 0.5
         footprint = Footprint.alike(np.array([[0, col]]), covered=covered, counts=counts, p_tp=0.9, p_tn=0.8)
-        observation = observe(passes, Reading(footprint, {(0, col): 4.5} if hit else {}))
+        observation = observe(
+            passes, "camera", next(CLOCK), Reading(footprint, {(0, col): 4.5} if hit else {})
+        )
         looks += 0 if observation is None else int(observation.first.sum())
         visits += col != last
         last = col

@@ -13,7 +13,8 @@ from service.camera import Errors, Flat, Pinhole, Sight, Spot, locate_pixel, rot
 from service.camera.locate import shares
 from service.camera.sensor import CameraSensor, Mount
 from service.config import Settings
-from service.evidence import Passes, Pose, Unreadable, observe
+from service.evidence import Pose, Unreadable, observe
+from service.passes import Passes
 from service.reports import Report
 from service.sensors import camera_sensor, cell_size, field_of_view
 
@@ -138,7 +139,7 @@ def test_a_hit_spread_over_cells_is_bayes_rule() -> None:
     exact = prior * np.array([[likelihood((r, c)) for c in range(30)] for r in range(30)])
     exact /= exact.sum()
     belief = Belief(prior)
-    o = observe(Passes(), reading)
+    o = observe(Passes(), "camera", 0.0, reading)
     assert o is not None
     belief.observe(o.cells, o.hits, o.p_tp, o.p_tn)
     assert belief.probability() == pytest.approx(exact, rel=1e-9)

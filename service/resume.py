@@ -10,6 +10,7 @@ from service.evidence import Observation
 from service.intake import Intake
 from service.journal import read_meta, read_rows
 from service.search import Search
+from service.verdict import ROW as VERDICT
 
 
 def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
@@ -18,9 +19,17 @@ def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
 
 
 def replay(journal: Path, search: Search, intake: Intake) -> int:
-    """Apply the journalled observations to a fresh search, in their order; returns how many reports there were."""
+    """Apply the journalled observations and verdicts to a fresh search, in their order.
+
+    Returns how many reports there were.
+    """
     ids = set()
-    for row in read_rows(journal, "report"):
+    for row in read_rows(journal, "report", VERDICT):
+        if row.kind == VERDICT:
+            said = Observation.from_dict(row.body["observation"])
+            down, across = row.body["cell"]
+            search.judge((down, across), said, confirmed=row.body["confirmed"])
+            continue
         ids.add(row.body["report"]["id"])
         if row.body["observation"] is not None:
             search.apply(Observation.from_dict(row.body["observation"]))

@@ -30,7 +30,7 @@ from service.camera.ground import Flat, Ground
 from service.camera.locate import Errors, Spot, locate_pixel, shares, spread
 from service.camera.look import Looks, look_at_cells
 from service.camera.optics import Pinhole, Sight, rotation, sight_from
-from service.evidence import Cell, Footprint, Pose, Reading, Unreadable
+from service.evidence import Cell, Footprint, Pose, Reading, Sighting, Unreadable
 from service.reports import Detection, Gimbal, Intrinsics, Report
 
 _LEAST_ON_FOOTPRINT = 0.05  # a detection with less of its probability in the cells looked at lies beside them
@@ -77,8 +77,10 @@ class CameraSensor:
         sight = self.sight(pose, report.gimbal, report.intrinsics)
         outline = report.footprint
         footprint = self._footprint(sight) if outline is None else self._outlined(outline)
-        spots = [self._spot(sight, seen) for seen in report.detections]
-        return Reading(footprint, self._hits(footprint, [spot for spot in spots if spot is not None]))
+        spots = [(spot, seen) for seen in report.detections if (spot := self._spot(sight, seen)) is not None]
+        hits, on_it = self._hits(footprint, [spot for spot, _ in spots])
+        found = [self._sighting(*spots[i]) for i in on_it]
+        return Reading(footprint, hits, tuple(found))
 
     def sight(self, pose: Pose, gimbal: Gimbal | None = None, intrinsics: Intrinsics | None = None) -> Sight:
         """The camera at a pose, turned as the report's gimbal says, else as it is mounted."""
@@ -152,18 +154,27 @@ class CameraSensor:
             located = locate_pixel(sight, pixels[0], (1.0, 1.0), self.ground, self.errors, self.max_range_m)
         return Spot(point, located.covariance if located else np.eye(2) * self.frame.cell_m**2)
 
-    def _hits(self, footprint: Footprint, spots: list[Spot]) -> dict[Cell, float]:
-        """The likelihood ratio of every cell that a detection may be a hit of."""
+    def _sighting(self, spot: Spot, seen: Detection) -> Sighting:
+        lat, lon = self.frame.from_metres(spot.point[None])[0]
+        c = spot.covariance
+        square = (float(c[0, 0]), float(c[0, 1]), float(c[1, 1]))
+        return Sighting(float(lat), float(lon), square, seen.thumbnail)
+
+    def _hits(self, footprint: Footprint, spots: list[Spot]) -> tuple[dict[Cell, float], list[int]]:
+        """The likelihood ratio of every cell that a detection may be a hit of, and which spots lie in these."""
         looked = footprint.counts
         cells, p_tp, p_tn = footprint.cells[looked], footprint.p_tp[looked], footprint.p_tn[looked]
         none = np.ones(len(cells))
-        for spot in spots:
+        on_it = []
+        for number, spot in enumerate(spots):
             share, on_footprint = shares(spread(spot, self.frame.cell_m), cells, p_tn)
             if on_footprint >= _LEAST_ON_FOOTPRINT:
                 none *= 1.0 - share
+                on_it.append(number)
         share = 1.0 - none
         ratio = share * p_tp / (1.0 - p_tn) + (1.0 - share) * (1.0 - p_tp) / p_tn
-        return {(row, col): float(ratio[i]) for i, (row, col) in enumerate(cells.tolist()) if share[i] > 0.0}
+        hits = {(r, c): float(ratio[i]) for i, (r, c) in enumerate(cells.tolist()) if share[i] > 0.0}
+        return hits, on_it
 
 
 def _attitude(pose: Pose) -> tuple[float, float]:

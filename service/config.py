@@ -81,6 +81,7 @@ class SensorSettings(Section):
     p_tn: float = Field(default=0.9, gt=0, lt=1)
     min_covered: float = Field(default=0.8, gt=0, le=1)
     silent_after_s: float = Field(default=10.0, gt=0)
+    hover_look_s: float = Field(default=0.0, ge=0, le=3600)
     camera_pitch_deg: float = Field(default=-90.0, ge=-90, le=0)
     camera_yaw_deg: float = Field(default=0.0, ge=-180, le=180)
     camera_roll_deg: float = Field(default=0.0, ge=-180, le=180)
@@ -96,7 +97,6 @@ class SensorSettings(Section):
     attitude_sigma_deg: float = Field(default=1.5, ge=0, le=30)
     position_sigma_m: float = Field(default=2.0, ge=0, le=1000)
     height_sigma_m: float = Field(default=2.0, ge=0, le=1000)
-    hover_look_s: float = Field(default=0.0, ge=0, le=3600)
 
 
 class SearchSettings(Section):

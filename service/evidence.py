@@ -7,6 +7,7 @@ and high enough. How many looks the frames of the same ground are, `service.pass
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -129,6 +130,11 @@ class Observation:
             np.array(row["first"], dtype=np.bool_),
             tuple(_sighting(each) for each in row.get("sightings", ())),
         )
+
+
+def finite_or_level(angle_deg: float) -> float:
+    """An angle of attitude; level until the vehicle has told it."""
+    return angle_deg if math.isfinite(angle_deg) else 0.0
 
 
 def _sighting(row: dict[str, Any]) -> Sighting:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping
 from typing import TYPE_CHECKING
 
+from service.evidence import Pose, finite_or_level
 from service.flight import LatLon
 from service.states import Event, State
 
@@ -33,6 +34,7 @@ class Finding:
         aircraft must fly home, or nothing."""
         self._mission = mission
         self._write, self._tick, self._energy_low = write, tick, energy_low
+        self._settings = mission.settings
         self._then = mission.settings.search.on_found
 
     async def look(self) -> bool:
@@ -42,6 +44,17 @@ class Finding:
         if found is not None and (known is None or (known.lat, known.lon) != (found.lat, found.lon)):
             await self._tell("the posterior passed search.found_at")
         return mission.state == State.FOUND
+
+    def hovers(self) -> bool:
+        """Whether to stay here for another look: at a suspect in view, when hovering gives one."""
+        mission = self._mission
+        if self._settings.sensor.hover_look_s == 0.0 or mission.state != State.CONFIRMING:
+            return False
+        t = mission.vehicle.telemetry
+        attitude = (finite_or_level(t.pitch_deg), finite_or_level(t.roll_deg))
+        pose = Pose(t.lat, t.lon, t.alt_home_m, t.heading_deg, t.position_time, *attitude)
+        seen = mission.intake.sensor.footprint(pose)
+        return list(mission.search.place.cell) in seen.cells[seen.counts].tolist()
 
     async def judge(self, place: LatLon | None, *, confirmed: bool) -> None:
         """Take in what an operator says about a place, or about the present one."""

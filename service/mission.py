@@ -76,6 +76,7 @@ class Mission:
         self._homeward = False  # a hold on the way home goes on home
         self._direct = False  # the way home is the autopilot's own: ours could not be flown
         self._resend = False  # the last waypoint may have been lost
+        self._hovering = False  # over a suspect, for another look
         self._refused = 0  # waypoints in a row that were not flown
         self._takeovers = Takeovers()
         fly = settings.flight
@@ -328,6 +329,15 @@ class Mission:
             decision, self._thinking = self._thinking.result(), None
             navigator.decide(decision.path)
             await self._decided(decision)
+        if self.finding.hovers():
+            if not self._hovering:
+                self._hovering = True
+                self._drop_thought()
+                await self.helm.hover()
+            return
+        if self._hovering:
+            self._hovering = False
+            navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
         thinking_s = self.settings.search.deadline_s * self.clock.speedup
         if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
             unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes]

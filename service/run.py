@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import os
 import re
 import shutil
@@ -27,6 +28,7 @@ from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
 from service.mission import Mission
+from service.passes import Passes
 from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
@@ -213,6 +215,7 @@ class Service:
         intake = Intake(
             self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
         )
+        intake.passes = Passes(again_s=self.settings.sensor.hover_look_s or math.inf)
         mission = Mission(
             settings=self.settings,
             clock=self.clock,

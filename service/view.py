@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,18 +10,13 @@ from prometheus_client import CollectorRegistry, Gauge, Histogram
 from service.area import SearchArea
 from service.clock import Clock
 from service.config import Settings
-from service.evidence import Pose
+from service.evidence import Pose, finite_or_level
 from service.intake import Intake
 from service.mission import Mission
 from service.reports import Receipt, Report
 from service.search import Search
 from service.sensors import Profile
 from service.states import FINAL, State
-
-
-def finite_or_level(angle_deg: float) -> float:
-    """The angle; level until the vehicle has told it."""
-    return angle_deg if math.isfinite(angle_deg) else 0.0
 
 
 class RunView:

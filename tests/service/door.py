@@ -43,7 +43,7 @@ class FakeRun:
         self.reports.append(report)
         return Receipt(id=report.id, status="accepted")
 
-    async def order(self, command: str) -> str:
+    async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
         self.orders.append(command)
         return "HOLDING"
 

@@ -187,3 +187,37 @@ def test_the_planner_plans_with_the_best_row_of_a_pass() -> None:
     assert (fov.p_tp <= 0.9).all()
     assert fov.p_tp.min() > 0.85
     assert len(set(fov.offsets[0][:, 1].tolist())) == fov.offsets.shape[1]
+
+
+def test_a_video_of_the_same_ground_clears_it_once_and_no_more_than_its_best_frame() -> None:
+    """Thirty frames a second while the aircraft flies on: one look, worth the frame that shows the cell best."""
+    belief, passes = Belief(np.ones(FRAME.shape)), Passes()
+    before = belief.probability()
+    best: dict[tuple[int, int], float] = {}
+    for frame in range(300):
+        reading = SENSOR.read(pose(20.0 - 0.01 * frame, 15.0), report())
+        seen = reading.footprint
+        for (row, col), counts, p_tp, p_tn in zip(
+            seen.cells.tolist(), seen.counts.tolist(), seen.p_tp, seen.p_tn, strict=True
+        ):
+            if counts:
+                ratio = (1.0 - p_tp) / p_tn
+                best[row, col] = min(best.get((row, col), 1.0), ratio)
+        o = observe(passes, "camera", frame / 30.0, reading)
+        if o is not None:
+            belief.observe(o.cells, o.hits, o.p_tp, o.p_tn)
+    odds = belief.probability() / before
+    odds /= odds[0, 0]  # never in view
+    assert len(best) > 12
+    for (row, col), ratio in best.items():
+        assert odds[row, col] == pytest.approx(ratio, rel=0.03)  # and nothing like ratio ** 300
+
+
+def test_hovering_gives_another_look_only_after_the_time_that_was_set() -> None:
+    for again_s, looks in ((math.inf, 1), (10.0, 3)):
+        passes = Passes(again_s=again_s)
+        count = 0
+        for frame in range(290):
+            o = observe(passes, "camera", frame / 10.0, SENSOR.read(pose(15, 15), report()))
+            count += 0 if o is None else [14, 15] in o.cells.tolist()
+        assert count == looks

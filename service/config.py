@@ -82,7 +82,7 @@ class FlightSettings(Section):
 
 
 class SensorSettings(Section):
-    profile: Literal["point", "donut", "wide-angle"] = "point"
+    profile: Literal["point", "donut", "wide-angle", "camera"] = "point"
     horizontal_fov_deg: float = Field(default=62.0, gt=5, lt=170)
     vertical_fov_deg: float = Field(default=55.0, gt=5, lt=170)
     overlap: float = Field(default=0.2, ge=0, lt=0.9)
@@ -92,12 +92,30 @@ class SensorSettings(Section):
     calibration_file: str = ""
     min_covered: float = Field(default=0.8, gt=0, le=1)
     silent_after_s: float = Field(default=10.0, gt=0)
+    hover_look_s: float = Field(default=0.0, ge=0, le=3600)
+    camera_pitch_deg: float = Field(default=-90.0, ge=-90, le=0)
+    camera_yaw_deg: float = Field(default=0.0, ge=-180, le=180)
+    camera_roll_deg: float = Field(default=0.0, ge=-180, le=180)
+    camera_stabilised: bool = True
+    image_width_px: int = Field(default=1920, ge=16, le=100_000)
+    image_height_px: int = Field(default=1080, ge=16, le=100_000)
+    target_size_m: float = Field(default=0.9, gt=0, le=100)
+    half_seen_px: float = Field(default=8.0, gt=0, le=1000)
+    min_p_tp: float = Field(default=0.2, gt=0, lt=1)
+    max_range_m: float = Field(default=300.0, gt=1, le=20_000)
+    min_grazing_deg: float = Field(default=10.0, ge=0, lt=90)
+    terrain_file: str = ""
+    attitude_sigma_deg: float = Field(default=1.5, ge=0, le=30)
+    position_sigma_m: float = Field(default=2.0, ge=0, le=1000)
+    height_sigma_m: float = Field(default=2.0, ge=0, le=1000)
 
 
 class SearchSettings(Section):
     planner: PlannerName = "puct-regions-lite"
     deadline_s: float = Field(default=0.038, gt=0, le=5)
     found_at: float = Field(default=0.999, gt=0.5, lt=1)
+    on_found: Literal["return", "hover", "continue"] = "return"
+    reject_reliability: float = Field(default=0.99, gt=0.5, lt=1)
     stop_at_pos: float = Field(default=0.999, gt=0, lt=1)
     max_area_km2: float = Field(default=100.0, gt=0)
     max_steps: int = Field(default=40_000, gt=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import os
 import re
 import shutil
@@ -24,16 +25,18 @@ from service.config import Settings
 from service.demo import World
 from service.doors import Doors, open_doors
 from service.errors import BadInput
-from service.evidence import Observation, Pose, Sensor
+from service.evidence import Observation, Pose
 from service.http import Door, open_door
 from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
 from service.mission import Mission
+from service.passes import Passes
 from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
 from service.search import Search
+from service.sensors import Profile, make_sensor
 from service.states import FINAL, State
 from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.view import RunView
@@ -124,9 +127,10 @@ def _search(
     """Compile the planner and fly."""
     try:
         search = Search(grid, settings)
+        sensor = make_sensor(settings, grid, search.fov)
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
-        service = Service(area, search, settings, folder, console)
+        service = Service(area, search, sensor, settings, folder, console)
         return asyncio.run(service.fly(door, doors, journal, signing_key))
     finally:
         journal.close()
@@ -162,22 +166,19 @@ class Service:
     """A search from its first process to the last file it leaves."""
 
     def __init__(
-        self, area: SearchArea, search: Search, settings: Settings, folder: Path, console: Console
+        self,
+        area: SearchArea,
+        search: Search,
+        sensor: Profile,
+        settings: Settings,
+        folder: Path,
+        console: Console,
     ) -> None:
         self.area, self.search, self.settings = area, search, settings
         self.folder, self.console = folder, console
         self.clock = Clock(settings.speedup)
         self.world: World | None = None
-        self.sensor = Sensor(
-            frame=search.grid.frame,
-            fov=search.fov,
-            p_tp=settings.sensor.p_tp,
-            p_tn=settings.sensor.p_tn,
-            overlap=settings.sensor.overlap,
-            min_covered=settings.sensor.min_covered,
-            height_m=settings.flight.altitude_m,
-            calibration=calibration_of(settings),
-        )
+        self.sensor = sensor
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 
     async def fly(self, door: Door, doors: Doors, journal: Journal, signing_key: bytes | None) -> int:
@@ -233,6 +234,7 @@ class Service:
         intake = Intake(
             self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
         )
+        intake.passes = Passes(again_s=self.settings.sensor.hover_look_s or math.inf)
         mission = Mission(
             settings=self.settings,
             clock=self.clock,

@@ -252,14 +252,12 @@ def _open_to_read(path: Path) -> sqlite3.Connection:
     database = sqlite3.connect(f"{address}?mode=ro", uri=True)
     try:
         database.execute("SELECT count(*) FROM sqlite_master").fetchone()
-    except (
-        sqlite3.OperationalError
-    ):  # a finished run where nothing may be written, not even SQLite's own files
+    except sqlite3.OperationalError:  # a finished run where not even SQLite's own files may be written
         if path.with_name(path.name + "-wal").exists():
             return database
         database.close()
         database = sqlite3.connect(f"{address}?mode=ro&immutable=1", uri=True)
-    except sqlite3.Error:
+    except (sqlite3.Error, UnicodeDecodeError):  # the latter when the damage is in what SQLite wants to say
         pass  # whoever reads is told
     return database
 
@@ -275,7 +273,7 @@ def read_rows(path: Path, *kinds: str) -> Iterator[Row]:
         query = f"{_ROWS} FROM events {where} ORDER BY seq"
         for seq, time, kind, key, body in database.execute(query, kinds):
             yield Row(seq, time, kind, key, json.loads(body))
-    except sqlite3.Error as error:
+    except (sqlite3.Error, ValueError) as error:
         raise BadInput(f"{path}: the journal cannot be read ({error})") from error
     finally:
         database.close()

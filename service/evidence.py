@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,10 +65,23 @@ class Footprint:
 @dataclass(frozen=True)
 class Reading:
     """What a sensor makes of one report: the cells that the frame shows, and for each of them with a hit the
-    likelihood ratio of it, P(hit | target there) / P(hit | target not there), above 0."""
+    likelihood ratio of it, P(hit | target there) / P(hit | target not there), above 0; and where its detections
+    are."""
 
     footprint: Footprint
     hits: Mapping[Cell, float]
+    sightings: tuple[Sighting, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One detection as the service places it: degrees, and the covariance of it in the grid's square metres as
+    (east-east, east-south, south-south), or None when nothing is known about its error."""
+
+    lat: float
+    lon: float
+    covariance: tuple[float, float, float] | None = None
+    thumbnail: str | None = None
 
 
 class Unreadable(ValueError):
@@ -79,6 +93,7 @@ class Observation:
     """What one report says about the ground: cells int [k, 2], hits bool [k], with their likelihoods [k].
 
     `first` bool [k] is False where a look of the same pass turned into a hit: that is not another look.
+    `sightings` are the frame's detections.
     """
 
     cells: NDArray[np.int64]
@@ -86,6 +101,13 @@ class Observation:
     p_tp: NDArray[np.float64]
     p_tn: NDArray[np.float64]
     first: NDArray[np.bool_]
+    sightings: tuple[Sighting, ...] = ()
+
+    @property
+    def speaking(self) -> list[Cell]:
+        """The cells with a hit that makes the target there more likely."""
+        for_it = self.hits & (self.p_tp > 1.0 - self.p_tn)
+        return [(row, col) for row, col in self.cells[for_it].tolist()]
 
     def to_dict(self) -> dict[str, object]:
         """Plain lists for the journal; floats keep every bit."""
@@ -95,10 +117,11 @@ class Observation:
             "p_tp": self.p_tp.tolist(),
             "p_tn": self.p_tn.tolist(),
             "first": self.first.tolist(),
+            **({"sightings": [asdict(each) for each in self.sightings]} if self.sightings else {}),
         }
 
     @classmethod
-    def from_dict(cls, row: dict[str, list[object]]) -> Observation:
+    def from_dict(cls, row: dict[str, list[Any]]) -> Observation:
         """The inverse of `to_dict`."""
         return cls(
             np.array(row["cells"], dtype=np.int64).reshape(-1, 2),
@@ -106,7 +129,19 @@ class Observation:
             np.array(row["p_tp"], dtype=np.float64),
             np.array(row["p_tn"], dtype=np.float64),
             np.array(row["first"], dtype=np.bool_),
+            tuple(_sighting(each) for each in row.get("sightings", ())),
         )
+
+
+def finite_or_level(angle_deg: float) -> float:
+    """An angle of attitude; level until the vehicle has told it."""
+    return angle_deg if math.isfinite(angle_deg) else 0.0
+
+
+def _sighting(row: dict[str, Any]) -> Sighting:
+    c = row["covariance"]
+    covariance = None if c is None else (c[0], c[1], c[2])
+    return Sighting(row["lat"], row["lon"], covariance, row["thumbnail"])
 
 
 def grid_heading(heading_deg: float, bearing_deg: float) -> str:
@@ -149,7 +184,7 @@ class Sensor:
         if self.calibration is not None and (looks := self.calibration.at(report.threshold)) is not None:
             k = len(footprint.cells)
             footprint = replace(footprint, p_tp=np.full(k, looks[0]), p_tn=np.full(k, looks[1]))
-        return Reading(footprint, hits)
+        return Reading(footprint, hits, sightings(report, self.frame, hits))
 
     def footprint(self, pose: Pose) -> Footprint:
         """The cells in view from `pose`; none when it is too low, off the grid or far between cells."""
@@ -192,6 +227,19 @@ class Sensor:
         return self.p_tp / (1.0 - self.p_tn) if self.calibration is None else self.calibration.ratio(score)
 
 
+def sightings(report: Report, frame: GridFrame, hits: Mapping[Cell, float]) -> tuple[Sighting, ...]:
+    """The detections of a report that lie in the cells of `hits` or beside them."""
+    found = []
+    for seen in report.detections if hits else ():
+        if seen.lat is None or seen.lon is None:
+            continue
+        row, col = frame.to_cells([[seen.lat, seen.lon]])[0].tolist()
+        if any((row + r, col + c) in hits for r in (-1, 0, 1) for c in (-1, 0, 1)):
+            square = None if seen.accuracy_m is None else (seen.accuracy_m**2, 0.0, seen.accuracy_m**2)
+            found.append(Sighting(seen.lat, seen.lon, square, seen.thumbnail))
+    return tuple(found)
+
+
 def observe(passes: Passes, source: str, time: float, reading: Reading) -> Observation | None:
     """The observation that a source's frame of that time adds, or None when it adds nothing new."""
     footprint = reading.footprint
@@ -208,4 +256,5 @@ def observe(passes: Passes, source: str, time: float, reading: Reading) -> Obser
         np.array([change.p_tp for change in changes]),
         np.array([change.p_tn for change in changes]),
         np.array([change.first for change in changes], dtype=np.bool_),
+        reading.sightings if any(change.hit for change in changes) else (),
     )

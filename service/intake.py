@@ -20,11 +20,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from service.clock import Clock
-from service.evidence import Observation, Pose, Sensor, Unreadable, observe
+from service.evidence import Cell, Observation, Pose, Unreadable, observe
 from service.journal import Journal
 from service.passes import Passes
 from service.reports import Receipt, Report
 from service.search import Search
+from service.sensors import Profile
+from service.verdict import ROW as VERDICT
+from service.verdict import verdict_on, verdict_row
 
 PoseAt = Callable[[float], Pose | None]
 PIECE = 64  # reports in one transaction: a hit behind a large batch does not wait for all of it
@@ -70,7 +73,7 @@ class Intake:
     which its report arrived. `history_s` is how far back the telemetry remembers."""
 
     search: Search
-    sensor: Sensor
+    sensor: Profile
     journal: Journal
     clock: Clock
     pose_at: PoseAt
@@ -84,6 +87,9 @@ class Intake:
     _ids: OrderedDict[str, None] = field(default_factory=OrderedDict)
     _waiting: list[_Waiting] = field(default_factory=list)
     _working: asyncio.Task[None] | None = None
+    _believing: asyncio.Lock = field(
+        default_factory=asyncio.Lock
+    )  # what is believed keeps the journal's order
 
     async def submit(self, report: Report) -> Receipt:
         """Take one report in. Raises JournalLost when it could not be written."""
@@ -122,6 +128,18 @@ class Intake:
         while len(self._ids) > MOST_IDS:
             self._ids.popitem(last=False)
 
+    async def judge(self, cell: Cell, *, confirmed: bool) -> None:
+        """Take in what an operator says about the place around `cell`; raises JournalLost."""
+        reliability = self.search.settings.search.reject_reliability
+        observation = verdict_on(cell, self.search.grid.frame.shape, reliability, confirmed=confirmed)
+        async with self._believing:
+            try:
+                body = verdict_row(cell, observation, confirmed=confirmed)
+                await self.journal.append(self.clock.now(), VERDICT, body)
+            except (sqlite3.Error, OSError) as error:
+                raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
+            self.search.judge(cell, observation, confirmed=confirmed)
+
     # ---- piece by piece
 
     async def _work(self) -> None:
@@ -130,7 +148,8 @@ class Intake:
             self._waiting.sort(key=lambda each: each.captured)
             piece, self._waiting = self._waiting[:PIECE], self._waiting[PIECE:]
             try:
-                await self._take(piece)
+                async with self._believing:
+                    await self._take(piece)
             except asyncio.CancelledError:
                 self._fail([*piece, *self._waiting], JournalLost("the service is ending"))
                 raise

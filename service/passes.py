@@ -3,7 +3,9 @@
 Neighbouring frames agree with each other, right or wrong, so a video of a cell is one look and not thirty a second.
 A *pass* over a cell begins with the first frame that covers it well enough for a look (or that has a hit in it), and
 goes on while the frames of its source show the cell at all; a frame of that source that does not show it ends the
-pass. Several sources that watch a cell at the same time share its pass: it goes on while any of them shows the cell.
+pass. So do `again_s` seconds, if frames so far apart are to be looks of their own: what one gains by hovering over a
+suspect (`sensor.hover_look_s`). Several sources that watch a cell at the same time share its pass: it goes on while
+any of them shows the cell.
 
 A pass is worth its best frame: a hit replaces a miss, a surer hit a weaker one, a miss from a better place a miss
 from a worse one, and never the reverse. So a calibration is to be made from the best score of each pass.
@@ -98,8 +100,9 @@ class _Source:
 class Passes:
     """The passes of the last `keep_s` seconds, by the time of capture."""
 
-    def __init__(self, keep_s: float = 120.0) -> None:
-        self._keep_s = keep_s
+    def __init__(self, keep_s: float = 120.0, again_s: float = math.inf) -> None:
+        """`again_s`: a pass that has lasted so many seconds is over, and the next frame begins another."""
+        self._keep_s, self._again_s = keep_s, again_s
         self._sources: dict[str, _Source] = {}
         self._cells: dict[Cell, list[_Pass]] = {}
         self._newest = self._pruned = -math.inf
@@ -159,7 +162,9 @@ class Passes:
     def _going_on(self, cell: Cell, time: float) -> _Pass | None:
         for one in reversed(self._cells.get(cell, ())):
             if one.after < time < one.before:
-                return one
+                if time < one.first + self._again_s:
+                    return one
+                one.before = time
         return None
 
     def _begin(self, known: _Source, time: float, cell: Cell) -> _Pass:

@@ -1,7 +1,7 @@
 """What comes through the door: detector reports and operator commands, as checked by pydantic.
 
 A report is one camera frame, looked at by a detector. This is version 1 of its schema; `config/report.schema.json`
-is the same as JSON Schema, and `roisearch-service --schema` prints it. A field that a sender leaves out means what
+is the same as JSON Schema, and `roisearch-service schema` prints it. A field that a sender leaves out means what
 its description says; a field that is not in the schema is refused, so that a misspelt one is not lost.
 
 Conventions. Degrees, metres, seconds. Angles turn as in MAVLink's ATTITUDE, in the order yaw, pitch, roll: yaw
@@ -251,4 +251,19 @@ class Receipt(DoorModel):
 class Command(DoorModel):
     """An order of the operator."""
 
-    command: Literal["hold", "resume", "return", "abort"]
+    command: Literal["hold", "resume", "return", "abort", "confirm", "reject"]
+    lat: Latitude | None = Field(default=None, description="of the place to confirm or reject")
+    lon: Longitude | None = Field(default=None, description="without it, the present suspect or found place")
+
+    @model_validator(mode="after")
+    def _a_place_or_none(self) -> Self:
+        if (self.lat is None) != (self.lon is None):
+            raise ValueError("a place has both lat and lon")
+        if self.lat is not None and self.command not in ("confirm", "reject"):
+            raise ValueError(f"'{self.command}' has no place; only confirm and reject do")
+        return self
+
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Latitude and longitude, if given."""
+        return None if self.lat is None or self.lon is None else (self.lat, self.lon)

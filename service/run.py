@@ -18,45 +18,40 @@ from typing import Any
 
 from rich.console import Console
 
-from service.area import Grid, SearchArea, build_grid, read_area, read_geotiff_prior
+from service.area import Grid, SearchArea
 from service.calibration import calibration_of
 from service.clock import Clock
 from service.config import Settings
 from service.demo import World
 from service.doors import Doors, open_doors
 from service.errors import BadInput
-from service.evidence import Observation, Pose, Sensor
+from service.evidence import Observation, Pose
 from service.http import Door, open_door
 from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
 from service.mission import Mission
+from service.passes import Passes
 from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
 from service.search import Search
+from service.sensors import Profile, make_sensor
 from service.states import FINAL, State
+from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.view import RunView
 
 log = logging.getLogger("roisearch")
 EXIT_CODES = {"found": 0, "not_found": 3, "aborted": 4}
-AREA, PRIOR, JOURNAL = "area.geojson", "prior.tif", "journal.sqlite"
-
-
-def cell_size(settings: Settings) -> float:
-    """The cell size in metres: as given, else the footprint's shorter side less the overlap."""
-    if settings.sensor.cell_m is not None:
-        return settings.sensor.cell_m
-    angle = min(settings.sensor.horizontal_fov_deg, settings.sensor.vertical_fov_deg)
-    footprint = 2.0 * settings.flight.altitude_m * math.tan(math.radians(angle / 2.0))
-    return round(footprint * (1.0 - settings.sensor.overlap), 1)
 
 
 def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     """Run a search from its area file to the ground; returns the exit code. Raises BadInput before it starts."""
     console = Console()
     set_up_logging(console)
-    area, grid = _survey(area_file, prior_file, settings)
+    area, grid = survey(area_file, prior_file, settings)
+    _tell(area, grid)
+    calibration_of(settings)  # a wrong table is told before anything starts
     signing_key = _signing_key(settings)
     with _open(settings) as (door, doors):
         folder = _new_folder(Path(settings.run.folder), area.name)
@@ -75,7 +70,9 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
     set_up_logging(console)
     settings = stored_settings(folder / JOURNAL, changed)
     prior_file = folder / PRIOR
-    area, grid = _survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
+    area, grid = survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
+    _tell(area, grid)
+    calibration_of(settings)  # a wrong table is told before anything starts
     signing_key = _signing_key(settings)
     with _open(settings) as (door, doors):
         journal = Journal(folder / JOURNAL)
@@ -96,19 +93,13 @@ def _open(settings: Settings) -> Iterator[tuple[Door, Doors]]:
         yield door, doors
 
 
-def _survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tuple[SearchArea, Grid]:
-    """The area and its grid, with what a person should know about them."""
-    area = read_area(area_file, max_area_km2=settings.search.max_area_km2)
-    grid = build_grid(area, cell_size(settings))
-    calibration_of(settings)  # a wrong table is told before anything starts
-    if prior_file is not None:
-        grid = grid.with_prior(read_geotiff_prior(prior_file, grid.frame, grid.covered))
+def _tell(area: SearchArea, grid: Grid) -> None:
+    """What a person should know about the area and its grid."""
     rows, cols = grid.frame.shape
     log.info("area: %s, %d cells of %g m to search", area.name, grid.searchable.sum(), grid.frame.cell_m)
     log.info("grid: %d x %d, turned to %.0f° true", rows, cols, grid.frame.bearing_deg)
     for note in grid.notes:
         log.info("note: %s", note)
-    return area, grid
 
 
 def _signing_key(settings: Settings) -> bytes | None:
@@ -136,9 +127,10 @@ def _search(
     """Compile the planner and fly."""
     try:
         search = Search(grid, settings)
+        sensor = make_sensor(settings, grid, search.fov)
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
-        service = Service(area, search, settings, folder, console)
+        service = Service(area, search, sensor, settings, folder, console)
         return asyncio.run(service.fly(door, doors, journal, signing_key))
     finally:
         journal.close()
@@ -174,22 +166,19 @@ class Service:
     """A search from its first process to the last file it leaves."""
 
     def __init__(
-        self, area: SearchArea, search: Search, settings: Settings, folder: Path, console: Console
+        self,
+        area: SearchArea,
+        search: Search,
+        sensor: Profile,
+        settings: Settings,
+        folder: Path,
+        console: Console,
     ) -> None:
         self.area, self.search, self.settings = area, search, settings
         self.folder, self.console = folder, console
         self.clock = Clock(settings.speedup)
         self.world: World | None = None
-        self.sensor = Sensor(
-            frame=search.grid.frame,
-            fov=search.fov,
-            p_tp=settings.sensor.p_tp,
-            p_tn=settings.sensor.p_tn,
-            overlap=settings.sensor.overlap,
-            min_covered=settings.sensor.min_covered,
-            height_m=settings.flight.altitude_m,
-            calibration=calibration_of(settings),
-        )
+        self.sensor = sensor
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 
     async def fly(self, door: Door, doors: Doors, journal: Journal, signing_key: bytes | None) -> int:
@@ -223,7 +212,10 @@ class Service:
         report = run_report(self.view.mission, self.area.name, self.settings, began)
         if self.world is not None:
             report["simulated"] = simulated(self.world.target, self.view.mission, self.settings)
-        write_results(self.folder, self.view.mission, report, self.view.picture())
+        try:
+            write_results(self.folder, self.view.mission, report, self.view.picture())
+        except OSError as error:
+            log.error("%s: the results cannot be written (%s)", self.folder, error.strerror)
         return EXIT_CODES[report["outcome"]]
 
     def _assemble(self, vehicle: Vehicle, journal: Journal) -> Mission:
@@ -242,6 +234,7 @@ class Service:
         intake = Intake(
             self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
         )
+        intake.passes = Passes(again_s=self.settings.sensor.hover_look_s or math.inf)
         mission = Mission(
             settings=self.settings,
             clock=self.clock,
@@ -307,8 +300,7 @@ class Service:
         except* (LinkError, JournalLost) as group:
             for error in group.exceptions:
                 log.error("%s", error)
-            mission.why_stopped = str(group.exceptions[0])
-            mission.state = State.ABORTED
+            await mission.leave(str(group.exceptions[0]))
         except* asyncio.CancelledError:
             mission.why_stopped = "stopped by a signal"
             mission.state = State.ABORTED

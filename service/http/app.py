@@ -41,7 +41,7 @@ class Run(Protocol):
     def picture(self) -> bytes: ...
     def ready(self) -> bool: ...
     async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]: ...
-    async def order(self, command: str) -> str: ...
+    async def order(self, command: str, place: tuple[float, float] | None = None) -> str: ...
 
 
 def create_app(
@@ -97,9 +97,11 @@ def create_app(
             raise too_many(http.reports_per_s, wait)
         return await run.submit_all(batch)
 
-    @app.post("/api/commands", summary="Give an order: hold, resume, return or abort")
+    @app.post(
+        "/api/commands", summary="Give an order: hold, resume, return or abort; confirm or reject a place"
+    )
     async def commands(command: Command) -> dict[str, str]:
-        return {"state": await run.order(command.command)}
+        return {"state": await run.order(command.command, command.place)}
 
     @app.get("/api/state", summary="Where the search stands, and the footprint of a frame taken now")
     async def state() -> Response:

@@ -344,6 +344,10 @@ class Vehicle:
         self._core.release_control(reason, self._clock.now())
         self._flush()
 
+    def stand_by(self, reason: str) -> None:
+        """What was sent is not wanted any more: neither the last target nor a command that moves it is repeated."""
+        self._core.stand_by(reason, self._clock.now())
+
     def status_text(self, text: str, severity: int = _SEVERITY_INFO) -> bool:
         """Say something to the pilot; False if no vehicle was heard yet."""
         said = self._core.status_text(text, severity)

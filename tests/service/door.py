@@ -43,7 +43,7 @@ class FakeRun:
         self.reports += reports
         return [Receipt(id=report.id, status="accepted") for report in reports]
 
-    async def order(self, command: str) -> str:
+    async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
         self.orders.append(command)
         return "HOLDING"
 

@@ -83,11 +83,15 @@ def create_app(
         assert isinstance(error, Refusal)
         return error.response(request.scope)
 
-    @app.post("/api/reports", summary="Report what a detector saw in one frame, or in several")
+    @app.post(
+        "/api/reports",
+        summary="Report what a detector saw in one frame, or in several",
+        response_model=list[Receipt],
+    )
     async def reports(
         request: Request,
         body: Annotated[Report | list[Report], Body(openapi_examples=openapi_examples(EXAMPLES))],
-    ) -> list[Receipt]:
+    ) -> Response:
         batch = body if isinstance(body, list) else [body]
         if len(batch) > http.max_batch:
             raise Refusal(413, f"a batch has at most {http.max_batch} reports")
@@ -95,7 +99,7 @@ def create_app(
         wait = buckets.take(who, http.reports_per_s, time.monotonic(), len(batch))
         if wait:
             raise too_many(http.reports_per_s, wait)
-        return await run.submit_all(batch)
+        return JSONResponse([receipt.model_dump() for receipt in await run.submit_all(batch)])
 
     @app.post(
         "/api/commands", summary="Give an order: hold, resume, return or abort; confirm or reject a place"

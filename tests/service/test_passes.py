@@ -143,6 +143,16 @@ def test_two_cameras_on_one_cell_share_its_pass_until_neither_shows_it() -> None
     assert looks(passes.take("a", 4.0, {HERE: MISS})) == 1
 
 
+def test_a_pass_goes_on_when_a_second_camera_is_heard_a_little_late() -> None:
+    passes = Passes()
+    passes.take("a", 1.0, {HERE: MISS})
+    passes.take("a", 2.0, {})
+    assert looks(passes.take("b", 1.9, {HERE: MISS})) == 0
+    assert looks(passes.take("b", 2.5, {HERE: MISS})) == 0
+    passes.take("b", 3.0, {})
+    assert looks(passes.take("b", 3.5, {HERE: MISS})) == 1
+
+
 def test_a_source_that_falls_silent_does_not_keep_a_cell_from_being_looked_at() -> None:
     passes = Passes()
     passes.take("dead", 0.0, {HERE: MISS})

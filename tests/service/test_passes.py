@@ -120,6 +120,12 @@ def test_a_late_frame_between_two_that_do_not_show_the_cell_is_a_look() -> None:
     assert looks(through(passes, [(6.0, MISS)])) == 1
 
 
+def test_a_late_frame_before_one_that_shows_the_cell_badly_is_of_the_same_pass() -> None:
+    passes = Passes()
+    through(passes, [(1.0, None), (3.0, PARTLY)])
+    assert looks(through(passes, [(2.0, MISS), (4.0, MISS)])) == 1
+
+
 # ---- several sources
 
 

@@ -89,7 +89,7 @@ def foresee(
     look()
     while pos[-1] < until and flown < most_s and len(cells) <= most_steps:
         state = SearchState(cell=cells[-1], heading=heading)
-        decision = search.planner.plan(search.belief, state, rng, deadline_s=settings.search.deadline_s)
+        decision = search.planner.plan(search.belief, state, rng)  # without a deadline: the same every time
         for cell in decision.path[:HEED]:
             turned = heading_between(cells[-1], cell)
             flown += leg_seconds(cell_m, flight) if turned != heading else cell_m / flight.speed_mps

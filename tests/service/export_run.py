@@ -109,7 +109,7 @@ def record(folder: Path, *, found: bool = False, part: float = 0.5) -> Path:
     cells = list(recorder.cells())
     lon, lat = at(150, 60)
     seen = (
-        {"class": "person", "score": 0.7, "lat": lat, "lon": lon},
+        {"class": "=person", "score": 0.7, "lat": lat, "lon": lon},
         {"class": "person", "box": [1, 2, 3, 4]},
     )
     for number, cell in enumerate(cells[: round(part * len(cells))]):

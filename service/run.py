@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import os
 import re
 import shutil
 import signal
 import time
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -17,20 +19,24 @@ from typing import Any
 from rich.console import Console
 
 from service.area import Grid, SearchArea
+from service.calibration import calibration_of
 from service.clock import Clock
 from service.config import Settings
 from service.demo import World
+from service.doors import Doors, open_doors
 from service.errors import BadInput
-from service.evidence import Observation, Pose, Sensor
+from service.evidence import Observation, Pose
 from service.http import Door, open_door
 from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
 from service.mission import Mission
+from service.passes import Passes
 from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
 from service.search import Search
+from service.sensors import Profile, make_sensor
 from service.states import FINAL, State
 from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.view import RunView
@@ -45,8 +51,9 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     set_up_logging(console)
     area, grid = survey(area_file, prior_file, settings)
     _tell(area, grid)
+    calibration_of(settings)  # a wrong table is told before anything starts
     signing_key = _signing_key(settings)
-    with contextlib.closing(open_door(settings.http, os.environ)) as door:
+    with _open(settings) as (door, doors):
         folder = _new_folder(Path(settings.run.folder), area.name)
         shutil.copyfile(area_file, folder / AREA)
         if prior_file is not None:
@@ -54,7 +61,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
         journal = Journal(folder / JOURNAL)
         journal.set_meta("grid", grid.frame.to_dict())
         journal.set_meta("settings", settings.model_dump())
-        return _search(area, grid, settings, folder, journal, door, signing_key, console)
+        return _search(area, grid, settings, folder, journal, door, doors, signing_key, console)
 
 
 def resume(folder: Path, changed: dict[str, Any]) -> int:
@@ -65,14 +72,25 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
     prior_file = folder / PRIOR
     area, grid = survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
     _tell(area, grid)
+    calibration_of(settings)  # a wrong table is told before anything starts
     signing_key = _signing_key(settings)
-    with contextlib.closing(open_door(settings.http, os.environ)) as door:
+    with _open(settings) as (door, doors):
         journal = Journal(folder / JOURNAL)
         if journal.meta("grid") != grid.frame.to_dict():
             raise BadInput(
                 f"{folder}: its journal is of another grid than its area file makes; resume it unchanged"
             )
-        return _search(area, grid, settings, folder, journal, door, signing_key, console)
+        return _search(area, grid, settings, folder, journal, door, doors, signing_key, console)
+
+
+@contextlib.contextmanager
+def _open(settings: Settings) -> Iterator[tuple[Door, Doors]]:
+    """Take every address before anything starts, and give them up at the end; raises BadInput."""
+    with (
+        contextlib.closing(open_door(settings.http, os.environ)) as door,
+        contextlib.closing(open_doors(settings.doors)) as doors,
+    ):
+        yield door, doors
 
 
 def _tell(area: SearchArea, grid: Grid) -> None:
@@ -102,16 +120,18 @@ def _search(
     folder: Path,
     journal: Journal,
     door: Door,
+    doors: Doors,
     signing_key: bytes | None,
     console: Console,
 ) -> int:
     """Compile the planner and fly."""
     try:
         search = Search(grid, settings)
+        sensor = make_sensor(settings, grid, search.fov)
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
-        service = Service(area, search, settings, folder, console)
-        return asyncio.run(service.fly(door, journal, signing_key))
+        service = Service(area, search, sensor, settings, folder, console)
+        return asyncio.run(service.fly(door, doors, journal, signing_key))
     finally:
         journal.close()
 
@@ -146,29 +166,28 @@ class Service:
     """A search from its first process to the last file it leaves."""
 
     def __init__(
-        self, area: SearchArea, search: Search, settings: Settings, folder: Path, console: Console
+        self,
+        area: SearchArea,
+        search: Search,
+        sensor: Profile,
+        settings: Settings,
+        folder: Path,
+        console: Console,
     ) -> None:
         self.area, self.search, self.settings = area, search, settings
         self.folder, self.console = folder, console
         self.clock = Clock(settings.speedup)
         self.world: World | None = None
-        self.sensor = Sensor(
-            frame=search.grid.frame,
-            fov=search.fov,
-            p_tp=settings.sensor.p_tp,
-            p_tn=settings.sensor.p_tn,
-            overlap=settings.sensor.overlap,
-            min_covered=settings.sensor.min_covered,
-            height_m=settings.flight.altitude_m,
-        )
+        self.sensor = sensor
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 
-    async def fly(self, door: Door, journal: Journal, signing_key: bytes | None) -> int:
+    async def fly(self, door: Door, doors: Doors, journal: Journal, signing_key: bytes | None) -> int:
         """Start everything, fly, and write the results; returns the exit code."""
         began = time.time()
         door, guest_token = door.with_guest()
         server = door.server(self.view)
         serving = asyncio.create_task(server.run_until_told())
+        listening = asyncio.create_task(doors.serve(self.view.submit_all))
         try:
             connect = await self._start_world()
             link = self._link_settings(signing_key)
@@ -183,6 +202,8 @@ class Service:
         finally:
             await asyncio.sleep(0.3 if self.world is not None else 0.0)  # let the detector read the end
             server.should_exit = True
+            listening.cancel()
+            await asyncio.wait([listening])
             await serving
             if self.world is not None:
                 await self.world.stop()
@@ -191,7 +212,10 @@ class Service:
         report = run_report(self.view.mission, self.area.name, self.settings, began)
         if self.world is not None:
             report["simulated"] = simulated(self.world.target, self.view.mission, self.settings)
-        write_results(self.folder, self.view.mission, report, self.view.picture())
+        try:
+            write_results(self.folder, self.view.mission, report, self.view.picture())
+        except OSError as error:
+            log.error("%s: the results cannot be written (%s)", self.folder, error.strerror)
         return EXIT_CODES[report["outcome"]]
 
     def _assemble(self, vehicle: Vehicle, journal: Journal) -> Mission:
@@ -201,12 +225,16 @@ class Service:
             pose = vehicle.pose_at(moment)
             if pose is None or not mission.helm.trust.trusted_at(moment):
                 return None
-            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment)
+            attitude = (pose.pitch_deg, pose.roll_deg)
+            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment, *attitude)
 
         def observed(observation: Observation, arrived: float) -> None:
             mission.observed(observation, arrived)
 
-        intake = Intake(self.search, self.sensor, journal, self.clock, pose_at, observed)
+        intake = Intake(
+            self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
+        )
+        intake.passes = Passes(again_s=self.settings.sensor.hover_look_s or math.inf)
         mission = Mission(
             settings=self.settings,
             clock=self.clock,
@@ -272,8 +300,7 @@ class Service:
         except* (LinkError, JournalLost) as group:
             for error in group.exceptions:
                 log.error("%s", error)
-            mission.why_stopped = str(group.exceptions[0])
-            mission.state = State.ABORTED
+            await mission.leave(str(group.exceptions[0]))
         except* asyncio.CancelledError:
             mission.why_stopped = "stopped by a signal"
             mission.state = State.ABORTED

@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from service.area import Grid, SearchArea, build_grid, read_area, read_geotiff_prior
 from service.config import Settings
+from service.sensors import cell_size
 
 AREA, PRIOR, JOURNAL = "area.geojson", "prior.tif", "journal.sqlite"
 """The files in a run's folder that the search is made of."""
-
-
-def cell_size(settings: Settings) -> float:
-    """The cell size in metres: as given, else the footprint's shorter side less the overlap."""
-    if settings.sensor.cell_m is not None:
-        return settings.sensor.cell_m
-    angle = min(settings.sensor.horizontal_fov_deg, settings.sensor.vertical_fov_deg)
-    footprint = 2.0 * settings.flight.altitude_m * math.tan(math.radians(angle / 2.0))
-    return round(footprint * (1.0 - settings.sensor.overlap), 1)
 
 
 def survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tuple[SearchArea, Grid]:

@@ -78,7 +78,7 @@ def _lead(run: Run) -> str:
         find = run.find
         text = (
             f"<strong>Found</strong> at {find.lat:.6f}, {find.lon:.6f} at {_clock(find.time)} UTC, with a probability "
-            f"of {_sure(find.probability)}. The place is good to about {find.sigma_m:.0f} m (1 sigma)."
+            f"of {_sure(find.probability)}. If it is there, it is within {find.ellipse[0]:.0f} m of that with 95 %."
         )
         return f'<p class="lead found">{text}</p>'
     place = int(run.poa.argmax())

@@ -63,7 +63,7 @@ class Preview:
     """Everything there is to say. Seconds are of flight and count from take-off, `before_s` being the first look.
 
     Attributes:
-        reachable: the most POS that any search of this grid can get to.
+        reachable: the most POS that any search of this grid can get to, with a wide footprint at most this.
         path: the search without alarms; `draws` those with.
         battery_s: how long one battery flies until it is time to go home; `pos_battery` is the POS by then.
         home: the longest way home, in no wind, landing included.
@@ -94,7 +94,8 @@ def preview(
     search = Search(grid, settings)
     regions = search.regions
     search.warm_up(lambda name, done, total: told(f"compiling {name}", done / total))
-    reachable = (1.0 - grid.outside) * grid.reachable_mass
+    seen = grid.reachable_mass if search.fov.is_point else 1.0  # a wider footprint sees over the edge
+    reachable = (1.0 - grid.outside) * seen
     until = min(max(GOALS), ENOUGH * reachable)
     start = grid.frame.to_latlon([grid.start])[0]
     before = climb_seconds(flight) + _route_seconds(

@@ -48,6 +48,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
         ),
         "<p>Left: where the target may be now, after everything that was seen and not seen. Right: how probable "
         "it is that the looks so far would have found it there. Both are turned with the grid.</p>",
+        _regions(run),
         "<h2>Where not</h2>",
         *_where_not(run, gaps, wishes),
         "<h2>What was found</h2>",
@@ -114,6 +115,26 @@ def _numbers(run: Run) -> str:
         ),
     ]
     return _table(("", ""), rows, head=False)
+
+
+def _regions(run: Run) -> str:
+    """The places that stood out before the search: what they hold now and how well they were searched."""
+    rows = []
+    for number in range(1, int(run.labels.max(initial=0)) + 1):
+        inside = run.labels == number
+        first, now = float(run.grid.prior[inside].sum()), float(run.poa[inside].sum())
+        before = first * (1.0 - run.grid.outside)
+        pod = float((run.grid.prior[inside] * run.pod[inside]).sum() / first) if first > 0.0 else 0.0
+        rows.append((f"ROI {number}", f"{before:.1%}", f"{now:.1%}", f"{pod:.0%}"))
+    if not rows:
+        return "<p>No place stood out before the search: the probability was spread evenly.</p>"
+    heads = (
+        "region of interest",
+        "probability before",
+        "probability now",
+        "POD, weighted by the probability before",
+    )
+    return _table(heads, rows[:MOST_ROWS]) + _more(len(rows))
 
 
 def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:

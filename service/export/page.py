@@ -18,7 +18,7 @@ from service.export.run import Detection, Run
 from service.export.wishes import Wishes
 
 MOST_ROWS = 100
-SAME_S = 30.0
+SAME_S, LATELY = 30.0, 50
 
 STYLE = """
 body { font: 16px/1.45 system-ui, sans-serif; color: #111; background: #fff; max-width: 60rem; margin: 1rem auto;
@@ -193,9 +193,10 @@ def sightings(run: Run) -> list[list[Detection]]:
     """Detections that are most likely the same thing, together: one class, within a cell, not long after each other."""
     seen: list[list[Detection]] = []
     for each in run.detections:
-        metres = run.frame.to_metres([(each.lat, each.lon), *((old[-1].lat, old[-1].lon) for old in seen)])
+        lately = seen[-LATELY:]
+        metres = run.frame.to_metres([(each.lat, each.lon), *((old[-1].lat, old[-1].lon) for old in lately)])
         away = np.hypot(*(metres[1:] - metres[0]).T)
-        for old, distance in zip(reversed(seen), reversed(away), strict=True):
+        for old, distance in zip(reversed(lately), reversed(away), strict=True):
             same = (old[-1].kind, old[-1].source) == (each.kind, each.source)
             if same and distance <= run.frame.cell_m and each.time - old[-1].time <= SAME_S:
                 old.append(each)

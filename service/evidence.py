@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
+from service.calibration import Calibration
 from service.passes import Look, Passes
 from service.reports import Report
 
@@ -163,6 +164,7 @@ class Sensor:
     overlap: float
     min_covered: float
     height_m: float
+    calibration: Calibration | None = None
 
     def read(self, pose: Pose, report: Report) -> Reading:
         """The evidence in a report of a frame taken from `pose`.
@@ -179,6 +181,9 @@ class Sensor:
             )
         footprint = self.footprint(pose)
         hits = self._hits(report, footprint)
+        if self.calibration is not None and (looks := self.calibration.at(report.threshold)) is not None:
+            k = len(footprint.cells)
+            footprint = replace(footprint, p_tp=np.full(k, looks[0]), p_tn=np.full(k, looks[1]))
         return Reading(footprint, hits, sightings(report, self.frame, hits))
 
     def footprint(self, pose: Pose) -> Footprint:
@@ -210,13 +215,17 @@ class Sensor:
         if not report.detections or not len(footprint.cells):
             return hits
         cells, _ = self.frame.locate(np.array([[seen.lat, seen.lon] for seen in report.detections]))
-        for cell in cells:
+        for cell, seen in zip(cells, report.detections, strict=True):
             gap = np.abs(footprint.cells - cell).max(axis=1)
             nearest = int(gap.argmin())
             if gap[nearest] <= 1:
-                row, col = footprint.cells[nearest]
-                hits[int(row), int(col)] = self.p_tp / (1.0 - self.p_tn)
+                row, col = (int(index) for index in footprint.cells[nearest])
+                hits[row, col] = max(self._ratio(seen.score), hits.get((row, col), 0.0))
         return hits
+
+    def _ratio(self, score: float) -> float:
+        """What a hit with this score is worth."""
+        return self.p_tp / (1.0 - self.p_tn) if self.calibration is None else self.calibration.ratio(score)
 
 
 def sightings(report: Report, frame: GridFrame, hits: Mapping[Cell, float]) -> tuple[Sighting, ...]:

@@ -77,7 +77,7 @@ class Finding:
         """Fly home from what was found, or hover until an operator decides or the energy runs low."""
         mission = self._mission
         if self._then == "hover" and mission.search.confirmed is None:
-            await mission.helm.hover()
+            await mission.helm.hover(wanted=lambda: mission.state == State.FOUND)
             while mission.state == State.FOUND and mission.search.confirmed is None:
                 if why := self._energy_low():
                     mission.why_stopped = why

@@ -22,9 +22,10 @@ from service.evidence import Observation
 from service.finding import Finding
 from service.flight import Flight, LatLon
 from service.helm import LEAST_PATIENCE_WALL_S, Helm
+from service.homeward import Homeward
 from service.intake import Intake, JournalLost
 from service.journal import Journal
-from service.limits import energy_objection, hold_objection
+from service.limits import hold_objection
 from service.mavlink import LinkError, Vehicle
 from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
@@ -37,6 +38,8 @@ log = logging.getLogger("roisearch")
 TICK_S = 0.1
 RETRY_S = 1.0
 REFUSALS = 2  # so many waypoints in a row that are not flown are no bad luck
+LEAVING_S = 5.0
+_CRITICAL = 2  # MAV_SEVERITY
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 MOVING = (*FLYING, State.RETURNING)
 BLIND = {"link", "position"}  # causes of a hold during which the aircraft cannot be sent home either
@@ -89,6 +92,7 @@ class Mission:
         self._group = asyncio.TaskGroup()
         self.finding = Finding(self, write=self._write, tick=self._tick, energy_low=self._energy_low)
         self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
+        self.homeward = Homeward(self.helm, clock, fly)
 
     # ---- state -------------------------------------------------------------------------------------------
 
@@ -119,8 +123,20 @@ class Mission:
     async def hold(self, cause: str, reason: str) -> None:
         """Hover until `cause` is gone; several causes can hold at once."""
         self._holds.add(cause)
-        if await self.happen(Event.HOLD, reason) and (refusal := await self.helm.hover()) is not None:
-            log.warning("no hold was sent: %s", refusal.reason)
+        if await self.happen(Event.HOLD, reason):
+            refusal = await self.helm.hover(wanted=lambda: self.state == State.HOLDING)
+            if refusal is not None:
+                log.warning("no hold was sent: %s", refusal.reason)
+
+    async def leave(self, reason: str) -> None:
+        """End the run where it is, for a fault that it cannot go on with: stop the aircraft if it is ours, and tell the
+        pilot, who has it now. Nothing is written: the journal may be what has failed."""
+        self.why_stopped, self.state = reason, State.ABORTED
+        self._drop_thought()
+        refusal = None if self.helm.on_ground() else self.helm.stop()
+        hovering = "" if refusal or self.helm.on_ground() else ", hovering"
+        if self.vehicle.status_text(f"search ABORTED{hovering}: {reason}", _CRITICAL):
+            await self.clock.sleep(LEAVING_S)  # a stop that is lost is sent again
 
     async def release(self, cause: str, reason: str) -> None:
         """`cause` no longer holds; the search goes on when nothing else does."""
@@ -198,7 +214,7 @@ class Mission:
         patience = self.settings.link.connect_timeout_s
         await self.vehicle.connect(patience)
         await self.vehicle.wait_until(lambda t: t.landed_state != "undefined", patience)
-        self.helm.altitude_m = self.vehicle.telemetry.home_alt_amsl_m + self.settings.flight.altitude_m
+        self.helm.begin()
         await self.happen(Event.LINKED, f"{self.vehicle.telemetry.autopilot} is ready")
         if self.may_take_off and self.helm.on_ground():
             await self._take_off()
@@ -309,7 +325,7 @@ class Mission:
 
     def _energy_low(self) -> str:
         """Why the aircraft must fly home now, or nothing."""
-        return energy_objection(self.vehicle.telemetry, self.flight_time(), self.settings.flight)
+        return self.homeward.energy.objection(self.flight_time(), self.settings.flight)
 
     async def _stop_searching(self, event: Event) -> None:
         self.searched = True
@@ -333,7 +349,7 @@ class Mission:
             if not self._hovering:
                 self._hovering = True
                 self._drop_thought()
-                await self.helm.hover()
+                await self.helm.hover(wanted=lambda: self.state in FLYING)
             return
         if self._hovering:
             self._hovering = False
@@ -373,7 +389,7 @@ class Mission:
     async def _go_home(self) -> None:
         """Fly home around what must not be flown over, then let the autopilot land."""
         if self.vehicle.telemetry.guided and not self._direct:
-            for point in self.helm.route(self.search.grid.launch)[:-1]:
+            for point in self.helm.route(self.helm.home())[:-1]:
                 if not await self._fly_to(point):
                     return
         await self._command(self.vehicle.return_to_launch(), "return to launch")
@@ -392,14 +408,14 @@ class Mission:
     async def _fly_to(self, point: LatLon) -> bool:
         """Fly straight to a point; False when the state changed on the way."""
         state = self.state
-        sent = await self._send(point)
+        sent = await self._send(point, on_way=True)
         while self.state == state:
             if self.helm.distance(self.helm.here(), point) <= self.settings.flight.corner_m:
                 return True
             if not sent or self._resend:
                 await self.clock.sleep(RETRY_S)
                 self._resend = False
-                sent = self.state == state and await self._send(point)
+                sent = self.state == state and await self._send(point, on_way=True)
             await self._tick()
         return False
 
@@ -408,12 +424,15 @@ class Mission:
     async def _guard(self) -> None:
         """Ten times a second: can the position be trusted, is the waypoint flown, is there too much wind?"""
         while True:
+            if self.journal.failed is not None:  # told to somebody else, who does not fly
+                raise self._journal_lost(self.journal.failed)
+            self.homeward.update()
             trouble = self.helm.trouble(moving=self.state in MOVING)
             if trouble is not None and self.state in (*MOVING, State.HOLDING):
                 await self.hold(trouble.cause, trouble.reason)
-            if self.state in FLYING and (windy := self.helm.too_windy()):
-                self.why_stopped = windy
-                await self.happen(Event.RETURN, windy)
+            if self.state in FLYING and (why := self.helm.too_windy() or self.helm.strayed()):
+                self.why_stopped = why
+                await self.happen(Event.RETURN, why)
             await self.clock.sleep(TICK_S)
 
     async def _watch(self) -> None:
@@ -436,7 +455,8 @@ class Mission:
             if why and not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
                 self.why_here += f"; {why}"
                 await self._write("yielded", {"reason": why})
-            if self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
+            told = not self.vehicle.events_waiting  # else why it landed may be among what is still to be read
+            if told and self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
                 why = f"landed before the search was over: {self.why_here}"
                 said = self._takeovers.said()  # often told only after the mode has changed
                 self.why_stopped = self.why_stopped or why + (said if said not in why else "")
@@ -468,9 +488,9 @@ class Mission:
 
     # ---- commands ----------------------------------------------------------------------------------------
 
-    async def _send(self, point: LatLon) -> bool:
+    async def _send(self, point: LatLon, *, on_way: bool = False) -> bool:
         """Send the aircraft to a point; hold when something speaks against it. False when it was not sent."""
-        refusal = await self.helm.send(point)
+        refusal = await self.helm.send(point, on_way=on_way)
         if refusal is None:
             self.flight.waypoints += 1
         elif refusal.cause in ("position", "limits"):
@@ -491,7 +511,10 @@ class Mission:
         try:
             await self.journal.append(self.clock.now(), kind, body)
         except (sqlite3.Error, OSError) as error:
-            raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
+            raise self._journal_lost(error) from error
+
+    def _journal_lost(self, error: Exception) -> JournalLost:
+        return JournalLost(f"the journal {self.journal.path} cannot be written: {error}")
 
     async def _decided(self, decision: Decision) -> None:
         self.flight.decisions += 1

@@ -1,7 +1,7 @@
 """What comes through the door: detector reports and operator commands, as checked by pydantic.
 
 A report is one camera frame, looked at by a detector. This is version 1 of its schema; `config/report.schema.json`
-is the same as JSON Schema, and `roisearch-service --schema` prints it. A field that a sender leaves out means what
+is the same as JSON Schema, and `roisearch-service schema` prints it. A field that a sender leaves out means what
 its description says; a field that is not in the schema is refused, so that a misspelt one is not lost.
 
 Conventions. Degrees, metres, seconds. Angles turn as in MAVLink's ATTITUDE, in the order yaw, pitch, roll: yaw

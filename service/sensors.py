@@ -14,6 +14,7 @@ import numpy as np
 
 from roisearch import FieldOfView
 from service.area import Grid, GridFrame
+from service.calibration import calibration_of
 from service.camera import Detectability, Errors, Flat, Ground, Pinhole, look_at_cells, read_terrain
 from service.camera.sensor import CameraSensor, Mount, nominal_view
 from service.config import Settings
@@ -48,6 +49,7 @@ def make_sensor(settings: Settings, grid: Grid, fov: FieldOfView) -> Profile:
             overlap=sensor.overlap,
             min_covered=sensor.min_covered,
             height_m=height,
+            calibration=calibration_of(settings),
         )
     ground: Ground = Flat()
     if sensor.terrain_file:

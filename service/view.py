@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -40,14 +42,16 @@ class RunView:
             ("roisearch_belief_entropy_bits", "Entropy of the belief", search.belief.entropy),
             ("roisearch_reports_accepted", "Detector reports taken in", lambda: self._reports()["accepted"]),
             ("roisearch_reports_refused", "Detector reports refused", lambda: self._reports()["refused"]),
+            ("roisearch_tasks", "Tasks of the event loop", lambda: len(asyncio.all_tasks())),
         ):
             Gauge(name, about, registry=self.registry).set_function(value)
 
-    async def submit(self, report: Report) -> Receipt:
-        """A detector report from the door."""
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        """Detector reports from a door."""
         if self.intake is None:
-            return Receipt(id=report.id, status="refused", reason="the service is still starting")
-        return await self.intake.submit(report)
+            why = "the service is still starting"
+            return [Receipt(id=report.id, status="refused", reason=why) for report in reports]
+        return await self.intake.submit_all(reports)
 
     async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
         """An operator's order from the door."""
@@ -90,7 +94,7 @@ class RunView:
             "outside": self.search.belief.outside,
             "steps": mission.flight.steps if mission else 0,
             "flight_time_s": flown,
-            "flight_left_s": self._flight_left(flown, telemetry.battery_percent if telemetry else None),
+            "flight_left_s": self._flight_left(flown),
             "battery_percent": telemetry.battery_percent if telemetry else None,
             "mode": telemetry.mode if telemetry else None,
             "reason": mission.reason.text if mission else "starting",
@@ -126,13 +130,10 @@ class RunView:
         best = float(footprint.covered.max(initial=0.0))
         return {"counts": bool(footprint.counts.any()), "covered": best, **nominal, "cells": cells}
 
-    def _flight_left(self, flown: float, battery: float | None) -> float | None:
-        """Seconds until the battery reaches its limit at the consumption so far; None while unknown."""
-        if battery is None or flown < 30.0 or battery >= 99.0:
-            return None
-        spare = battery - self.settings.flight.min_battery_percent
-        left = max(0.0, spare * flown / (100.0 - battery))
-        return min(left, max(0.0, self.settings.flight.max_flight_s - flown))
+    def _flight_left(self, flown: float) -> float | None:
+        """Seconds until the way home must begin, for the battery or the time; None while unknown."""
+        left = self.mission.homeward.energy.seconds_left(self.settings.flight) if self.mission else None
+        return None if left is None else min(left, max(0.0, self.settings.flight.max_flight_s - flown))
 
     def map(self) -> dict[str, Any]:
         """The belief and the probability of detection, cell by cell (null where nothing is searched)."""

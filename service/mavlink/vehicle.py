@@ -152,6 +152,11 @@ class Vehicle:
         while (event := await self._queue.get()) is not None:
             yield event
 
+    @property
+    def events_waiting(self) -> bool:
+        """True while `telemetry` is ahead of what the reader of `events` has been told."""
+        return not self._queue.empty()
+
     async def wait_until(self, condition: Callable[[Telemetry], bool], timeout_s: float) -> bool:
         """Wait until what is known fulfils a condition; False if it did not in time."""
         return await self._until(lambda: condition(self._core.telemetry) or None, timeout_s) is not None
@@ -338,6 +343,10 @@ class Vehicle:
         """Give control up until `enter_guided`: nothing that moves the aircraft is sent any more."""
         self._core.release_control(reason, self._clock.now())
         self._flush()
+
+    def stand_by(self, reason: str) -> None:
+        """What was sent is not wanted any more: neither the last target nor a command that moves it is repeated."""
+        self._core.stand_by(reason, self._clock.now())
 
     def status_text(self, text: str, severity: int = _SEVERITY_INFO) -> bool:
         """Say something to the pilot; False if no vehicle was heard yet."""

@@ -78,10 +78,10 @@ def test_the_model_and_the_shipped_schema_refuse_the_same(
 
 
 def test_the_service_prints_the_schema_that_ships(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--schema"]) == 0
+    assert main(["schema"]) == 0
     printed = capsys.readouterr().out
     assert printed == SHIPPED.read_text(encoding="utf-8"), (
-        "roisearch-service --schema > config/report.schema.json"
+        "roisearch-service schema > config/report.schema.json"
     )
 
 

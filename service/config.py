@@ -105,6 +105,12 @@ class HttpSettings(Section):
     body_timeout_s: float = Field(default=5.0, gt=0, le=300)
 
 
+class PageSettings(Section):
+    tiles_url: str = ""
+    tiles_attribution: str = ""
+    mbtiles_file: str = ""
+
+
 class RunSettings(Section):
     folder: str = "runs"
     seed: int = Field(default=1, ge=0)
@@ -123,6 +129,7 @@ class Settings(Section):
     sensor: SensorSettings = SensorSettings()
     search: SearchSettings = SearchSettings()
     http: HttpSettings = HttpSettings()
+    page: PageSettings = PageSettings()
     run: RunSettings = RunSettings()
     demo: DemoSettings = DemoSettings()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,22 @@ def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
     return changed_settings(read_meta(journal, "settings"), changed, str(journal))
 
 
-def replay(journal: Path, search: Search, intake: Intake) -> int:
-    """Apply the journalled observations to a fresh search, in their order; returns how many reports there were."""
+def replay(
+    journal: Path,
+    search: Search,
+    intake: Intake,
+    told: Callable[[float, float], None] = lambda time, pos: None,
+) -> int:
+    """Apply the journalled observations to a fresh search, in their order; returns how many reports there were.
+
+    `told` hears the time of each observation and the POS after it.
+    """
     ids = set()
     for row in read_rows(journal, "report"):
         ids.add(row.body["report"]["id"])
         if row.body["observation"] is not None:
             search.apply(Observation.from_dict(row.body["observation"]))
+            told(row.time, search.record.pos)
     intake.remember(ids)
     intake.accepted = len(ids)
     return len(ids)

@@ -55,7 +55,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     set_up_logging(console)
     area, grid = _survey(area_file, prior_file, settings)
     signing_key = _signing_key(settings)
-    with contextlib.closing(open_door(settings.http, os.environ)) as door:
+    with contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door:
         folder = _new_folder(Path(settings.run.folder), area.name)
         shutil.copyfile(area_file, folder / AREA)
         if prior_file is not None:
@@ -74,7 +74,7 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
     prior_file = folder / PRIOR
     area, grid = _survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
     signing_key = _signing_key(settings)
-    with contextlib.closing(open_door(settings.http, os.environ)) as door:
+    with contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door:
         journal = Journal(folder / JOURNAL)
         if journal.meta("grid") != grid.frame.to_dict():
             raise BadInput(
@@ -124,6 +124,7 @@ def _search(
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
         service = Service(area, search, settings, folder, console)
+        service.view.estimator.warm_up()
         return asyncio.run(service.fly(door, journal, signing_key))
     finally:
         journal.close()
@@ -217,6 +218,7 @@ class Service:
             return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment)
 
         def observed(observation: Observation, arrived: float) -> None:
+            self.view.curve.add(self.clock.now(), self.search.record.pos)
             mission.observed(observation, arrived)
 
         intake = Intake(self.search, self.sensor, journal, self.clock, pose_at, observed)
@@ -229,8 +231,9 @@ class Service:
             intake=intake,
             may_take_off=self.settings.mock or self.settings.flight.takeoff,
             sent=self.view.latency.observe,
+            thought=self.view.thinking.observe,
         )
-        replayed = replay(journal.path, self.search, intake)
+        replayed = replay(journal.path, self.search, intake, self.view.curve.add)
         if replayed:
             log.info(
                 "resumed: %d reports of the earlier run, POS %.1f %%", replayed, 100 * self.search.record.pos

@@ -10,7 +10,6 @@ import asyncio
 import functools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from roisearch.place import Place, most_likely_place
 from service.area import Grid
 from service.config import Settings
 from service.evidence import Observation
+from service.reasons import Reason, explain
 
 Cell = tuple[int, int]
 FIELDS_OF_VIEW: dict[str, Callable[[], FieldOfView]] = {
@@ -28,14 +28,6 @@ FIELDS_OF_VIEW: dict[str, Callable[[], FieldOfView]] = {
     "donut": FieldOfView.donut,
     "wide-angle": FieldOfView.wide_angle,
 }
-
-
-@dataclass(frozen=True)
-class Reason:
-    """Why the aircraft goes where it goes, for a person: one line, and the root options with their visits."""
-
-    text: str
-    options: tuple[tuple[str, int, float], ...]
 
 
 class Search:
@@ -94,21 +86,7 @@ class Search:
 
     def reason(self, decision: Decision, cell: Cell) -> Reason:
         """The decision in words: where to, how much is there, how far, and what else was weighed."""
-        ranked = sorted(decision.alternatives, key=lambda option: -option.visits)
-        options = tuple((option.action, option.visits, option.value) for option in ranked)
-        goal = decision.goal or decision.path[-1]
-        label = int(self.regions.labels[goal])
-        distance = self.distance(cell, goal)
-        if label:
-            mass = float(self.belief.probability()[self.regions.labels == label].sum())
-            where = f"ROI {label}: {mass:.0%} of the probability, {distance:.0f} m"
-        else:
-            where = f"open ground, {distance:.0f} m"
-        return Reason(f"{decision.action} → {where}", options)
-
-    def distance(self, here: Cell, there: Cell) -> float:
-        """Metres between two cells along the grid."""
-        return (abs(here[0] - there[0]) + abs(here[1] - there[1])) * self.grid.frame.cell_m
+        return explain(decision, cell, self.belief.probability(), self.regions, self.grid.frame.cell_m)
 
     def nearest_flyable(self, cell: Cell) -> Cell:
         """The flyable cell nearest to `cell`, itself if it is flyable."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from service.errors import BadInput
+from service.toml_lines import key_lines
 
 PlannerName = Literal[
     "puct-regions-lite",
@@ -156,16 +158,65 @@ def _flatten(model: type[BaseModel]) -> dict[str, Any]:
 KNOWN_KEYS: tuple[str, ...] = tuple(_flatten(Settings))
 
 
-def _complaint(error: ValidationError, where: str) -> BadInput:
-    """The first problem pydantic found, as one sentence that names the key and what is allowed."""
-    first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
+def nearest_key(key: str) -> str | None:
+    """The setting that a key which is none most likely means: of the same name elsewhere, or of a similar one."""
+    namesakes = [known for known in KNOWN_KEYS if known.rpartition(".")[2] == key.rpartition(".")[2]]
+    if namesakes:
+        return namesakes[0]
+    known = KNOWN_KEYS if "." in key else (*Settings.model_fields, *KNOWN_KEYS)
+    near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
+    return near[0] if near else None
+
+
+def problems(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Everything that is wrong with settings: pairs of a dotted key and a sentence; empty when nothing is."""
+    try:
+        Settings.model_validate(values)
+    except ValidationError as error:
+        return [_problem(details) for details in error.errors()]
+    return []
+
+
+def _problem(details: Any) -> tuple[str, str]:
+    key = ".".join(str(part) for part in details["loc"])
+    if details["type"] == "extra_forbidden":
+        near = nearest_key(key)
         known = KNOWN_KEYS if "." in key else tuple(Settings.model_fields)
-        near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
-        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
-        return BadInput(f"{where}: there is no setting '{key}'; {hint}")
-    return BadInput(f"{where}: '{key}' = {first['input']!r} is not possible: {first['msg']}")
+        hint = f"did you mean '{near}'?" if near else f"known are {', '.join(known)}"
+        return key, f"there is no setting '{key}'; {hint}"
+    return key, f"'{key}' = {details['input']!r} is not possible: {details['msg']}"
+
+
+def read_toml(file: Path) -> tuple[dict[str, Any], str]:
+    """The values of a TOML file, and its text; raises BadInput with the line that is wrong."""
+    try:
+        text = file.read_text(encoding="utf-8")
+        return tomllib.loads(text), text
+    except OSError as error:
+        raise BadInput(f"{file}: cannot be read ({error.strerror}); give an existing TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise BadInput(f"{file}{f':{line[1]}' if line else ''}: is not TOML: {error}") from error
+
+
+def file_problems(file: Path) -> list[str]:
+    """Everything that is wrong with a settings file, as sentences with file and line; raises BadInput if no TOML."""
+    values, text = read_toml(file)
+    wrong = problems(values)
+    lines = key_lines(text) if wrong else {}
+
+    def line(key: str) -> int:
+        while key and key not in lines:  # a wrong item of a list stands where the list does
+            key = key.rpartition(".")[0]
+        return lines.get(key, 0)
+
+    found = sorted((line(key), sentence) for key, sentence in wrong)
+    return [f"{file}:{number}: {sentence}" if number else f"{file}: {sentence}" for number, sentence in found]
+
+
+def variable_name(key: str) -> str:
+    """The environment variable that overrides 'section.key'."""
+    return f"ROISEARCH_{key.replace('.', '_')}".upper()
 
 
 def read_settings(
@@ -182,19 +233,13 @@ def read_settings(
     where = "settings"
     if file is not None:
         where = str(file)
-        try:
-            values = tomllib.loads(file.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise BadInput(
-                f"{file}: cannot be read ({error.strerror}); give an existing TOML file"
-            ) from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise BadInput(f"{file}: is not TOML: {error}") from error
-        _check(values, where)
+        values, _ = read_toml(file)
+        if wrong := file_problems(file):
+            raise BadInput(wrong[0])
     variables = os.environ if environment is None else environment
     for dotted in KNOWN_KEYS:
         section, key = dotted.split(".")
-        name = f"ROISEARCH_{section}_{key}".upper()
+        name = variable_name(dotted)
         if name in variables:
             values.setdefault(section, {})[key] = variables[name]
             where = f"environment variable {name}"
@@ -219,7 +264,6 @@ def changed_settings(values: dict[str, Any], changed: Mapping[str, Any], where: 
 
 
 def _check(values: dict[str, Any], where: str) -> Settings:
-    try:
-        return Settings.model_validate(values)
-    except ValidationError as error:
-        raise _complaint(error, where) from error
+    if wrong := problems(values):
+        raise BadInput(f"{where}: {wrong[0][1]}")
+    return Settings.model_validate(values)

@@ -49,6 +49,19 @@ def cell_size(settings: Settings) -> float:
     return round(footprint * (1.0 - settings.sensor.overlap), 1)
 
 
+def sensor_of(search: Search, settings: Settings) -> Sensor:
+    """The sensor of these settings on the grid of a search."""
+    return Sensor(
+        frame=search.grid.frame,
+        fov=search.fov,
+        p_tp=settings.sensor.p_tp,
+        p_tn=settings.sensor.p_tn,
+        overlap=settings.sensor.overlap,
+        min_covered=settings.sensor.min_covered,
+        height_m=settings.flight.altitude_m,
+    )
+
+
 def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     """Run a search from its area file to the ground; returns the exit code. Raises BadInput before it starts."""
     console = Console()
@@ -83,12 +96,18 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
         return _search(area, grid, settings, folder, journal, door, signing_key, console)
 
 
-def _survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tuple[SearchArea, Grid]:
-    """The area and its grid, with what a person should know about them."""
+def read_ground(area_file: Path, prior_file: Path | None, settings: Settings) -> tuple[SearchArea, Grid]:
+    """The area and its grid, as these settings lay it."""
     area = read_area(area_file, max_area_km2=settings.search.max_area_km2)
     grid = build_grid(area, cell_size(settings))
     if prior_file is not None:
         grid = grid.with_prior(read_geotiff_prior(prior_file, grid.frame, grid.covered))
+    return area, grid
+
+
+def _survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tuple[SearchArea, Grid]:
+    """The area and its grid, with what a person should know about them."""
+    area, grid = read_ground(area_file, prior_file, settings)
     rows, cols = grid.frame.shape
     log.info("area: %s, %d cells of %g m to search", area.name, grid.searchable.sum(), grid.frame.cell_m)
     log.info("grid: %d x %d, turned to %.0f° true", rows, cols, grid.frame.bearing_deg)
@@ -166,15 +185,7 @@ class Service:
         self.folder, self.console = folder, console
         self.clock = Clock(settings.speedup)
         self.world: World | None = None
-        self.sensor = Sensor(
-            frame=search.grid.frame,
-            fov=search.fov,
-            p_tp=settings.sensor.p_tp,
-            p_tn=settings.sensor.p_tn,
-            overlap=settings.sensor.overlap,
-            min_covered=settings.sensor.min_covered,
-            height_m=settings.flight.altitude_m,
-        )
+        self.sensor = sensor_of(search, settings)
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 
     async def fly(self, door: Door, journal: Journal, signing_key: bytes | None) -> int:

@@ -60,6 +60,10 @@ class Search:
         self._hits.update((row, col) for row, col in observation.cells[observation.hits].tolist())
         self._place = None
 
+    def go_back(self, belief: Belief, record: DetectionRecord) -> None:
+        """Take up an earlier belief and record, which are ours from now on."""
+        self.belief, self.record, self._place = belief, record, None
+
     def was_hit(self, place: Place) -> bool:
         """True when a detection was ever reported at `place` or beside it: a sharp prior alone finds nobody."""
         row, col = place.cell

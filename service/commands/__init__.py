@@ -5,5 +5,6 @@ A module has `main(arguments: list[str]) -> int`, which returns the exit code, a
 
 COMMANDS = {
     "config": "check or show settings",
+    "replay": "show a run that is over on the page",
 }
 """Each word with what it does, for the help."""

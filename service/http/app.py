@@ -73,6 +73,10 @@ def create_app(
             allow_headers=["authorization", "content-type"],
         )
 
+    def only_live() -> None:
+        if past is not None:
+            raise Refusal(409, "this is a replay: it takes neither reports nor orders")
+
     @app.exception_handler(JournalLost)
     async def journal_lost(_: Request, error: Exception) -> Response:
         return JSONResponse({"detail": str(error)}, status_code=503)
@@ -96,6 +100,7 @@ def create_app(
         request: Request,
         body: Annotated[Report | list[Report], Body(openapi_examples=examples.REPORTS)],
     ) -> list[Receipt]:
+        only_live()
         batch = body if isinstance(body, list) else [body]
         if len(batch) > http.max_batch:
             raise Refusal(413, f"a batch has at most {http.max_batch} reports")
@@ -111,6 +116,7 @@ def create_app(
     async def commands(
         command: Annotated[Command, Body(openapi_examples=examples.COMMANDS)],
     ) -> dict[str, str]:
+        only_live()
         return {"state": await run.order(command.command)}
 
     def then(at: float | None) -> Run:

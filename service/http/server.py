@@ -17,7 +17,7 @@ from service.config import HttpSettings, PageSettings
 from service.http.access import Access, read_access
 from service.http.address import bind, bound_address, split_address, url_of
 from service.http.app import create_app
-from service.http.run import Run
+from service.http.run import PastRun, Run
 from service.underlay import NO_UNDERLAY, Underlay, open_underlay
 
 _MOST_CONNECTIONS = 256
@@ -46,8 +46,8 @@ class Door:
         access, token = self.access.with_guest()
         return replace(self, access=access), token
 
-    def server(self, run: Run) -> Server:
-        """A server of a run at this door."""
+    def server(self, run: Run, past: PastRun | None = None) -> Server:
+        """A server of a run at this door; for `past` see `create_app`."""
         address = bound_address(self.listener)
         name = split_address(self.http.listen)[0]
         app = create_app(
@@ -57,6 +57,7 @@ class Door:
             names=() if address.is_unspecified else (name if ":" not in name else f"[{name}]", f"{address}"),
             any_address=address.is_unspecified,
             underlay=self.underlay,
+            past=past,
         )
         return Server(app, self.listener, self.http)
 

@@ -57,8 +57,9 @@ export const Cells = L.Layer.extend({
 const HEAT = [[255, 247, 188], [254, 217, 118], [253, 160, 60], [240, 84, 30], [189, 17, 40], [98, 8, 66]];
 const DECADES = 3;
 
+/** The colour of a place on the scale: pale for long, so that what stands out does. */
 function mix(stops, part) {
-  const at = Math.min(1, Math.max(0, part)) * (stops.length - 1);
+  const at = Math.min(1, Math.max(0, part)) ** 1.4 * (stops.length - 1);
   const low = Math.min(stops.length - 2, Math.floor(at));
   return stops[low].map((value, i) => value + (stops[low + 1][i] - value) * (at - low));
 }

@@ -24,6 +24,8 @@ function begin(scene) {
   live = !scene.replay;
   document.title = `${scene.area} · roisearch`;
   say($("area"), scene.area);
+  $("orders").hidden = !live;
+  if (!live && !replay) replay = new Replay(scene.replay, (at) => events.show(at));
   if (before && place(before) === place(scene)) chart.run = run; // the service was started again: keep the view
   else {
     chart?.map.remove();
@@ -31,7 +33,6 @@ function begin(scene) {
     chart = new Chart($("map"), run, kept(scene), keep, () => $("suspects-card").scrollIntoView({ block: "nearest" }));
     showLayers(chart);
   }
-  if (scene.replay && !replay) replay = new Replay(scene.replay, (at) => events.show(at));
 }
 
 function show(moment) {

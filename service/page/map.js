@@ -49,12 +49,12 @@ export class Chart {
     this.run = run;
     this.onSuspect = onSuspect;
     const { frame, tiles } = run.scene;
-    this.map = L.map(element, { zoomSnap: 0.5, zoomDelta: 0.5, maxZoom: 21, attributionControl: !!tiles, preferCanvas: false });
+    this.map = L.map(element, { zoomSnap: 0.25, zoomDelta: 0.5, maxZoom: 21, attributionControl: !!tiles, preferCanvas: false });
     this.map.attributionControl?.setPrefix(false);
     L.control.scale({ imperial: false, maxWidth: 160 }).addTo(this.map);
     for (const [name, height] of [["cells", 350], ["pod", 351], ["ground", 360], ["flight", 420]]) this.map.createPane(name).style.zIndex = height;
     if (kept) this.map.setView(kept.centre, kept.zoom);
-    else this.map.fitBounds(L.latLngBounds(frame.corners), { padding: [24, 24] });
+    else this.map.fitBounds(L.latLngBounds(frame.corners), { padding: [10, 10] });
     this.hidden = new Set(kept?.hidden ?? []);
     this.layers = this.make(frame, tiles);
     for (const [key] of LAYERS) if (!this.hidden.has(key)) this.layers[key]?.addTo(this.map);

@@ -107,6 +107,7 @@ function facts({ battery_percent, flight_left_s, flight_time_s, steps, mode, pos
   if (detector?.silent) looks = [`silent for ${lasting(detector.silent_s)}`, "bad"];
   else if (detector && detector.silent_s !== null) looks = [`reporting, ${reports.accepted} so far`, ""];
   if (reports.refused) looks = [looks[0] + `, ${reports.refused} refused`, looks[1] || "doubtful"];
+  const past = link === null; // a replay knows only what was written down
   return [
     ["battery", ...battery],
     ["time left", ...left],
@@ -117,7 +118,7 @@ function facts({ battery_percent, flight_left_s, flight_time_s, steps, mode, pos
     ["in the air", `${lasting(flight_time_s)}, ${steps} cells`, ""],
     ["not in the area", percent(outside), ""],
     ...(speedup > 1 ? [["clock", `simulated, ${speedup} times faster`, "doubtful"]] : []),
-  ];
+  ].filter(([, value]) => !past || value !== "unknown");
 }
 
 export function showFacts(state) {

@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from service.area import SearchArea
 from service.config import Settings
-from service.evidence import Pose, Sensor
+from service.evidence import Pose
 from service.flight import LatLon
 from service.scene import describe
 from service.search import Search
+from service.sensors import Profile
 from service.shapes import area_features, cell_features, collection, feature, line, point, region_features
 
 
 class BaseView:
     """A search to look at; who derives from it says where the aircraft is and what state the search is in."""
 
-    def __init__(self, area: SearchArea, search: Search, sensor: Sensor, settings: Settings) -> None:
+    def __init__(self, area: SearchArea, search: Search, sensor: Profile, settings: Settings) -> None:
         self.area, self.search, self.sensor, self.settings = area, search, sensor, settings
         self._outlines = region_features(search.grid, search.regions.labels)
 
@@ -47,17 +48,23 @@ class BaseView:
         return {"lat": float(lat), "lon": float(lon), "probability": place.probability}
 
     def footprint(self, pose: Pose | None) -> dict[str, Any]:
-        """The cells that a frame taken now shows, with their corners (north-west first, clockwise)."""
+        """The cells that a frame taken now shows, with their corners (north-west first, clockwise), how much of each is
+        covered, and what a look is worth there; p_tp and p_tn of the footprint are the settings'."""
+        nominal = {"p_tp": self.settings.sensor.p_tp, "p_tn": self.settings.sensor.p_tn}
         if pose is None:
-            return {"counts": False, "covered": 0.0, "cells": []}
+            return {"counts": False, "covered": 0.0, **nominal, "cells": []}
         footprint, frame = self.sensor.footprint(pose), self.search.grid.frame
         corners = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
         cells = []
-        for row, col in footprint.cells.tolist():
+        worth = (footprint.counts, footprint.covered, footprint.p_tp, footprint.p_tn)
+        columns = [column.tolist() for column in (footprint.cells, *worth)]
+        for (row, col), counts, covered, p_tp, p_tn in zip(*columns, strict=True):
             points = frame.to_latlon(np.vstack([[[row, col]], np.array([row, col]) + corners])).tolist()
             centre, around = points[0], points[1:]
-            cells.append({"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around})
-        return {"counts": footprint.counts, "covered": footprint.covered, "cells": cells}
+            where = {"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around}
+            cells.append({**where, "counts": counts, "covered": covered, "p_tp": p_tp, "p_tn": p_tn})
+        best = float(footprint.covered.max(initial=0.0))
+        return {"counts": bool(footprint.counts.any()), "covered": best, **nominal, "cells": cells}
 
     def region_masses(self) -> list[float]:
         """The probability of each region of interest now, region 1 first."""

@@ -63,7 +63,15 @@ class FlightSettings(Section):
     corner_m: float = Field(default=5.0, ge=1, le=50)
     takeoff: bool = False
     min_battery_percent: float = Field(default=20.0, ge=0, le=95)
+    reserve_percent: float = Field(default=15.0, ge=0, le=90)
+    max_airspeed_mps: float = Field(default=15.0, ge=2, le=40)
+    climb_mps: float = Field(default=2.0, ge=0.2, le=20)
+    descent_mps: float = Field(default=1.0, ge=0.2, le=20)
+    return_height_m: float = Field(default=60.0, ge=0, le=500)
     max_flight_s: float = Field(default=7200.0, gt=0)
+    margin_m: float = Field(default=30.0, ge=0, le=5000)
+    min_height_m: float = Field(default=3.0, ge=1, le=500)
+    max_height_m: float = Field(default=120.0, ge=5, le=500)
     max_launch_distance_m: float = Field(default=20_000.0, gt=0)
     min_satellites: int = Field(default=6, ge=0, le=40)
     max_jump_m: float = Field(default=10.0, gt=0)
@@ -74,21 +82,40 @@ class FlightSettings(Section):
 
 
 class SensorSettings(Section):
-    profile: Literal["point", "donut", "wide-angle"] = "point"
+    profile: Literal["point", "donut", "wide-angle", "camera"] = "point"
     horizontal_fov_deg: float = Field(default=62.0, gt=5, lt=170)
     vertical_fov_deg: float = Field(default=55.0, gt=5, lt=170)
     overlap: float = Field(default=0.2, ge=0, lt=0.9)
     cell_m: float | None = Field(default=None, gt=0.5, le=1000)
     p_tp: float = Field(default=0.9, gt=0, lt=1)
     p_tn: float = Field(default=0.9, gt=0, lt=1)
+    calibration_file: str = ""
     min_covered: float = Field(default=0.8, gt=0, le=1)
     silent_after_s: float = Field(default=10.0, gt=0)
+    hover_look_s: float = Field(default=0.0, ge=0, le=3600)
+    camera_pitch_deg: float = Field(default=-90.0, ge=-90, le=0)
+    camera_yaw_deg: float = Field(default=0.0, ge=-180, le=180)
+    camera_roll_deg: float = Field(default=0.0, ge=-180, le=180)
+    camera_stabilised: bool = True
+    image_width_px: int = Field(default=1920, ge=16, le=100_000)
+    image_height_px: int = Field(default=1080, ge=16, le=100_000)
+    target_size_m: float = Field(default=0.9, gt=0, le=100)
+    half_seen_px: float = Field(default=8.0, gt=0, le=1000)
+    min_p_tp: float = Field(default=0.2, gt=0, lt=1)
+    max_range_m: float = Field(default=300.0, gt=1, le=20_000)
+    min_grazing_deg: float = Field(default=10.0, ge=0, lt=90)
+    terrain_file: str = ""
+    attitude_sigma_deg: float = Field(default=1.5, ge=0, le=30)
+    position_sigma_m: float = Field(default=2.0, ge=0, le=1000)
+    height_sigma_m: float = Field(default=2.0, ge=0, le=1000)
 
 
 class SearchSettings(Section):
     planner: PlannerName = "puct-regions-lite"
     deadline_s: float = Field(default=0.038, gt=0, le=5)
     found_at: float = Field(default=0.999, gt=0.5, lt=1)
+    on_found: Literal["return", "hover", "continue"] = "return"
+    reject_reliability: float = Field(default=0.99, gt=0.5, lt=1)
     stop_at_pos: float = Field(default=0.999, gt=0, lt=1)
     max_area_km2: float = Field(default=100.0, gt=0)
     max_steps: int = Field(default=40_000, gt=0)
@@ -113,6 +140,14 @@ class PageSettings(Section):
     mbtiles_file: str = ""
 
 
+class DoorSettings(Section):
+    udp: str = ""
+    unix: str = ""
+    mqtt: str = ""
+    mqtt_topic: str = "roisearch/reports"
+    mqtt_credentials_file: str = ""
+
+
 class RunSettings(Section):
     folder: str = "runs"
     seed: int = Field(default=1, ge=0)
@@ -132,6 +167,7 @@ class Settings(Section):
     search: SearchSettings = SearchSettings()
     http: HttpSettings = HttpSettings()
     page: PageSettings = PageSettings()
+    doors: DoorSettings = DoorSettings()
     run: RunSettings = RunSettings()
     demo: DemoSettings = DemoSettings()
 
@@ -258,6 +294,12 @@ def changed_settings(values: dict[str, Any], changed: Mapping[str, Any], where: 
             values.setdefault(section, {})[key] = value
             _check(values, f"--{key.replace('_', '-')}")
     settings = _check(values, where)
+    flight = settings.flight
+    if not flight.min_height_m <= flight.altitude_m <= flight.max_height_m:
+        raise BadInput(
+            f"{where}: 'flight.altitude_m' = {flight.altitude_m:g} is not between min_height_m = "
+            f"{flight.min_height_m:g} and max_height_m = {flight.max_height_m:g}; change one of them"
+        )
     if settings.link.speedup not in (None, 1.0) and settings.link.connect.startswith("serial"):
         raise BadInput(f"{settings.link.connect} is a real aircraft: it flies at a speedup of 1")
     return settings

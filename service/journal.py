@@ -2,17 +2,21 @@
 
 One SQLite file in WAL mode, `synchronous=FULL`: a row that `append` has returned for survives a power cut. A
 single writer thread commits what has gathered since its last commit in one transaction, so that many reports a
-second cost few flushes. Bodies are JSON; floats are written with every bit.
+second cost few flushes. Bodies are JSON; floats are written with every bit. Every row has its number and a checksum,
+so a journal that was damaged since is refused rather than believed. The first write that fails is remembered
+(`failed`), for those who must not go on without a journal.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import queue
 import sqlite3
 import threading
-from collections.abc import Iterator, Mapping
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +24,12 @@ from typing import Any
 
 from service.errors import BadInput
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # 1 had no checksums
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS events (
-    seq INTEGER PRIMARY KEY, time REAL NOT NULL, kind TEXT NOT NULL, key TEXT UNIQUE, body TEXT NOT NULL
+    seq INTEGER PRIMARY KEY, time REAL NOT NULL, kind TEXT NOT NULL, key TEXT UNIQUE, body TEXT NOT NULL,
+    crc INTEGER NOT NULL DEFAULT 0
 );
 CREATE INDEX IF NOT EXISTS events_by_kind ON events (kind, seq);
 """
@@ -58,31 +63,59 @@ class Journal:
     """A journal open for writing. Use `append` from the event loop, `close` at the end."""
 
     def __init__(self, path: Path) -> None:
-        """Open or create the file; raises BadInput when that is impossible or its schema is another one."""
+        """Open or create the file, brought up to this version's schema.
+
+        Raises BadInput: it cannot be opened or written, is of a newer schema, or was damaged.
+        """
         self.path = path
-        self._queue: queue.SimpleQueue[_Entry | None] = queue.SimpleQueue()
+        self.failed: Exception | None = None
+        """The first write that did not succeed."""
+        self._queue: queue.SimpleQueue[list[_Entry] | None] = queue.SimpleQueue()
         self._closed = False
+        self._last = 0
         try:
             self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
             self._database.execute("PRAGMA journal_mode=WAL")
             self._database.execute("PRAGMA synchronous=FULL")
-            self._database.executescript(SCHEMA)
-            self._database.execute(
-                "INSERT OR IGNORE INTO meta VALUES ('schema', ?)", (json.dumps(SCHEMA_VERSION),)
-            )
-        except sqlite3.Error as error:
+            self._open()
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise BadInput(
                 f"{path}: the journal cannot be opened ({error}); give a writable folder"
             ) from error
-        if (found := self.meta("schema")) != SCHEMA_VERSION:
-            raise BadInput(f"{path}: journal of schema {found}, this version reads {SCHEMA_VERSION}")
         self._writer = threading.Thread(target=self._write, name="journal", daemon=True)
         self._writer.start()
 
+    def _open(self) -> None:
+        if not self._database.execute("SELECT 1 FROM sqlite_master WHERE name = 'meta'").fetchone():
+            self._database.executescript(SCHEMA)
+            self.set_meta("schema", SCHEMA_VERSION)
+            return
+        _refuse_newer(self.path, self.meta("schema"))
+        if (damage := self._database.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
+            raise _damaged(self.path, damage)
+        if self.meta("schema") == 1:
+            self._add_checksums()
+        for row in self._database.execute(_ROWS + ", crc FROM events ORDER BY seq"):
+            self._last += 1
+            if row[0] != self._last:
+                raise _damaged(self.path, f"row {self._last} is missing")
+            if row[-1] != _crc(*row[:-1]):
+                raise _damaged(self.path, f"row {row[0]} is not what was written")
+
+    def _add_checksums(self) -> None:
+        """From schema 1 to 2."""
+        self._database.execute("BEGIN IMMEDIATE")
+        self._database.execute("ALTER TABLE events ADD COLUMN crc INTEGER NOT NULL DEFAULT 0")
+        rows = self._database.execute(_ROWS + " FROM events").fetchall()
+        self._database.executemany(
+            "UPDATE events SET crc = ? WHERE seq = ?", [(_crc(*row), row[0]) for row in rows]
+        )
+        self.set_meta("schema", 2)
+        self._database.execute("COMMIT")
+
     def meta(self, key: str) -> Any:
         """A value stored with `set_meta`, or None."""
-        row = self._database.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-        return None if row is None else json.loads(row[0])
+        return _meta(self._database, self.path, key)
 
     def set_meta(self, key: str, value: Any) -> None:
         """Store a JSON value under a key (used before the run starts)."""
@@ -90,15 +123,37 @@ class Journal:
 
     def write(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> Future[int]:
         """Queue a row; the future holds its number once it is on disk, or raises Duplicate."""
+        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
+        self._enqueue([entry])
+        return entry.done
+
+    def _enqueue(self, entries: list[_Entry]) -> None:
+        """Queue rows that are written in one transaction: all of them, or none."""
         if self._closed:
             raise RuntimeError("the journal is closed")
-        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
-        self._queue.put(entry)
-        return entry.done
+        for entry in entries:
+            entry.done.set_running_or_notify_cancel()  # who stops waiting does not stop the row from being written
+        self._queue.put(entries)
 
     async def append(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> int:
         """Write a row and return its number once it is on disk; raises Duplicate when `key` is known."""
         return await asyncio.wrap_future(self.write(time, kind, body, key))
+
+    async def append_all(self, rows: Sequence[tuple[float, str, str, str]]) -> list[bool]:
+        """Write rows of (time, kind, key, body as JSON) in one transaction; returns when they are on disk.
+
+        Returns for each whether it is new; raises what kept them from being written, and then none is.
+        """
+        entries = [_Entry(time, kind, key, body, Future()) for time, kind, key, body in rows]
+        if not entries:
+            return []
+        self._enqueue(entries)
+        await asyncio.wait([asyncio.wrap_future(entries[-1].done)])  # the outcomes come in their order
+        failures = [entry.done.exception() for entry in entries]
+        for failure in failures:
+            if failure is not None and not isinstance(failure, Duplicate):
+                raise failure
+        return [failure is None for failure in failures]
 
     def close(self) -> None:
         """Write what is queued, then close the file."""
@@ -116,25 +171,28 @@ class Journal:
             while not self._queue.empty():
                 batch.append(self._queue.get())
             open_ = None not in batch
-            self._commit([entry for entry in batch if entry is not None])
+            self._commit([entry for entries in batch if entries is not None for entry in entries])
 
     def _commit(self, entries: list[_Entry]) -> None:
         outcomes: list[tuple[_Entry, int | Exception]] = []
+        last = self._last
         try:
             self._database.execute("BEGIN IMMEDIATE")
             for entry in entries:
+                row = (last + 1, entry.time, entry.kind, entry.key, entry.body)
                 try:
-                    cursor = self._database.execute(
-                        "INSERT INTO events (time, kind, key, body) VALUES (?, ?, ?, ?)",
-                        (entry.time, entry.kind, entry.key, entry.body),
-                    )
-                    outcomes.append((entry, int(cursor.lastrowid or 0)))
+                    self._database.execute("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", (*row, _crc(*row)))
+                    last += 1
+                    outcomes.append((entry, last))
                 except sqlite3.IntegrityError:
                     outcomes.append((entry, Duplicate(f"'{entry.key}' is in the journal already")))
             self._database.execute("COMMIT")
+            self._last = last
         except sqlite3.Error as error:
-            if self._database.in_transaction:
-                self._database.execute("ROLLBACK")
+            self.failed = self.failed or error
+            with contextlib.suppress(sqlite3.Error):
+                if self._database.in_transaction:
+                    self._database.execute("ROLLBACK")
             outcomes = [(entry, error) for entry in entries]
         for entry, outcome in outcomes:
             if isinstance(outcome, Exception):
@@ -143,35 +201,79 @@ class Journal:
                 entry.done.set_result(outcome)
 
 
+_ROWS = "SELECT seq, time, kind, key, body"
+
+
+def _crc(seq: int, time: float, kind: str, key: str | None, body: str) -> int:
+    """The checksum of a row: a flipped bit anywhere in it changes this."""
+    return zlib.crc32(json.dumps([seq, time, kind, key, body]).encode())
+
+
+def _damaged(path: Path, how: str) -> BadInput:
+    return BadInput(f"{path}: the journal is damaged ({how}); resume from a copy, or begin a new run")
+
+
+def _refuse_newer(path: Path, schema: object) -> None:
+    if schema not in (1, SCHEMA_VERSION):
+        raise BadInput(
+            f"{path}: journal of schema {schema}, this version reads 1 to {SCHEMA_VERSION}; "
+            "resume it with the version that wrote it"
+        )
+
+
+def _meta(database: sqlite3.Connection, path: Path, key: str) -> Any:
+    row = database.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+    try:
+        return None if row is None else json.loads(row[0])
+    except (ValueError, TypeError):
+        raise _damaged(path, f"its {key} cannot be read") from None
+
+
 def read_meta(path: Path, key: str) -> Any:
     """A value that a journal was given with `set_meta`; raises BadInput when there is no such journal or value."""
     database = _open_to_read(path)
     try:
-        row = database.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-    except sqlite3.Error as error:
+        _refuse_newer(path, _meta(database, path, "schema"))
+        value = _meta(database, path, key)
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: the journal cannot be read ({error})") from error
     finally:
         database.close()
-    if row is None:
+    if value is None:
         raise BadInput(f"{path}: the journal has no {key}; it is not one of a started run")
-    return json.loads(row[0])
+    return value
 
 
 def _open_to_read(path: Path) -> sqlite3.Connection:
+    """A reader beside the writer, if there is one: in WAL mode neither waits for the other."""
     if not path.is_file():
         raise BadInput(f"{path}: there is no journal here; give the folder of a run")
-    return sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+    address = path.resolve().as_uri()
+    database = sqlite3.connect(f"{address}?mode=ro", uri=True)
+    try:
+        database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError:  # a finished run where not even SQLite's own files may be written
+        if path.with_name(path.name + "-wal").exists():
+            return database
+        database.close()
+        database = sqlite3.connect(f"{address}?mode=ro&immutable=1", uri=True)
+    except (sqlite3.Error, UnicodeDecodeError):  # the latter when the damage is in what SQLite wants to say
+        pass  # whoever reads is told
+    return database
 
 
 def read_rows(path: Path, *kinds: str) -> Iterator[Row]:
-    """The rows of a journal in order, of the given kinds or all; raises BadInput when it cannot be read."""
+    """The rows of a journal in order, of the given kinds or all, as they were when the first was read.
+
+    Raises BadInput when it cannot be read.
+    """
     database = _open_to_read(path)
     try:
         where = f"WHERE kind IN ({', '.join('?' * len(kinds))})" if kinds else ""
-        query = f"SELECT seq, time, kind, key, body FROM events {where} ORDER BY seq"
+        query = f"{_ROWS} FROM events {where} ORDER BY seq"
         for seq, time, kind, key, body in database.execute(query, kinds):
             yield Row(seq, time, kind, key, json.loads(body))
-    except sqlite3.Error as error:
+    except (sqlite3.Error, ValueError) as error:
         raise BadInput(f"{path}: the journal cannot be read ({error})") from error
     finally:
         database.close()

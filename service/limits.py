@@ -41,13 +41,6 @@ def position_objections(t: Telemetry, flight: FlightSettings, fresh_s: float) ->
     return objections
 
 
-def energy_objection(t: Telemetry, flown_s: float, flight: FlightSettings) -> str:
-    """Why the aircraft must fly home now, or nothing; `flown_s` seconds it has been in the air."""
-    if t.battery_percent is not None and t.battery_percent <= flight.min_battery_percent:
-        return f"battery at {t.battery_percent:.0f} %"
-    return f"{flown_s:.0f} s in the air" if flown_s >= flight.max_flight_s else ""
-
-
 def hold_objection(held_s: float, flight: FlightSettings) -> str:
     """Why hovering for a fault has to end after so many seconds, or nothing."""
     return f"hovered for {held_s:.0f} s" if held_s > flight.max_hold_s else ""

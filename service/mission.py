@@ -19,23 +19,28 @@ from roisearch import Decision
 from service.clock import Clock
 from service.config import Settings
 from service.evidence import Observation
-from service.flight import Flight, Found, LatLon
+from service.finding import Finding
+from service.flight import Flight, LatLon
 from service.helm import LEAST_PATIENCE_WALL_S, Helm
+from service.homeward import Homeward
 from service.intake import Intake, JournalLost
 from service.journal import Journal
-from service.limits import energy_objection, hold_objection
+from service.limits import hold_objection
 from service.mavlink import LinkError, Vehicle
 from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
 from service.reasons import Reason
 from service.search import Search
 from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
+from service.suspects import Found
 from service.takeover import Takeovers
 
 log = logging.getLogger("roisearch")
 TICK_S = 0.1
 RETRY_S = 1.0
 REFUSALS = 2  # so many waypoints in a row that are not flown are no bad luck
+LEAVING_S = 5.0
+_CRITICAL = 2  # MAV_SEVERITY
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 MOVING = (*FLYING, State.RETURNING)
 BLIND = {"link", "position"}  # causes of a hold during which the aircraft cannot be sent home either
@@ -76,6 +81,7 @@ class Mission:
         self._homeward = False  # a hold on the way home goes on home
         self._direct = False  # the way home is the autopilot's own: ours could not be flown
         self._resend = False  # the last waypoint may have been lost
+        self._hovering = False  # over a suspect, for another look
         self._refused = 0  # waypoints in a row that were not flown
         self._takeovers = Takeovers()
         fly = settings.flight
@@ -86,7 +92,9 @@ class Mission:
         self._changed = asyncio.Event()
         self._wake = asyncio.Event()
         self._group = asyncio.TaskGroup()
+        self.finding = Finding(self, write=self._write, tick=self._tick, energy_low=self._energy_low)
         self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
+        self.homeward = Homeward(self.helm, clock, fly)
 
     # ---- state -------------------------------------------------------------------------------------------
 
@@ -117,8 +125,20 @@ class Mission:
     async def hold(self, cause: str, reason: str) -> None:
         """Hover until `cause` is gone; several causes can hold at once."""
         self._holds.add(cause)
-        if await self.happen(Event.HOLD, reason) and (refusal := await self.helm.hover()) is not None:
-            log.warning("no hold was sent: %s", refusal.reason)
+        if await self.happen(Event.HOLD, reason):
+            refusal = await self.helm.hover(wanted=lambda: self.state == State.HOLDING)
+            if refusal is not None:
+                log.warning("no hold was sent: %s", refusal.reason)
+
+    async def leave(self, reason: str) -> None:
+        """End the run where it is, for a fault that it cannot go on with: stop the aircraft if it is ours, and tell the
+        pilot, who has it now. Nothing is written: the journal may be what has failed."""
+        self.why_stopped, self.state = reason, State.ABORTED
+        self._drop_thought()
+        refusal = None if self.helm.on_ground() else self.helm.stop()
+        hovering = "" if refusal or self.helm.on_ground() else ", hovering"
+        if self.vehicle.status_text(f"search ABORTED{hovering}: {reason}", _CRITICAL):
+            await self.clock.sleep(LEAVING_S)  # a stop that is lost is sent again
 
     async def release(self, cause: str, reason: str) -> None:
         """`cause` no longer holds; the search goes on when nothing else does."""
@@ -126,11 +146,15 @@ class Mission:
         if not self._holds:
             await self.happen(Event.RETURN if self._homeward else Event.RESUME, reason)
 
-    async def order(self, command: str) -> str:
-        """An operator's order: hold, resume, return or abort. Returns what came of it, in words."""
-        await self._write("order", {"command": command, "state": self.state})
+    async def order(self, command: str, place: LatLon | None = None) -> str:
+        """An operator's order: hold, resume, return or abort; confirm or reject a place, the present one unless
+        given. Returns the state that came of it."""
+        await self._write("order", {"command": command, "state": self.state, "place": place})
         try:
-            await self._obey(command)
+            if command in ("confirm", "reject"):
+                await self.finding.judge(place, confirmed=command == "confirm")
+            else:
+                await self._obey(command)
         except LinkError as error:
             log.warning("%s: %s", command, error)
             self.vehicle.status_text(f"search {self.state}: {command} failed: {error}")
@@ -192,7 +216,7 @@ class Mission:
         patience = self.settings.link.connect_timeout_s
         await self.vehicle.connect(patience)
         await self.vehicle.wait_until(lambda t: t.landed_state != "undefined", patience)
-        self.helm.altitude_m = self.vehicle.telemetry.home_alt_amsl_m + self.settings.flight.altitude_m
+        self.helm.begin()
         await self.happen(Event.LINKED, f"{self.vehicle.telemetry.autopilot} is ready")
         if self.may_take_off and self.helm.on_ground():
             await self._take_off()
@@ -227,7 +251,7 @@ class Mission:
         if self.state in FLYING:
             await self._search()
         elif self.state == State.FOUND:
-            await self.happen(Event.RETURN, "found: flying home")
+            await self.finding.wait_over_the_place()
         elif self.state == State.RETURNING:
             await self._go_home()
         elif self.state == State.HOLDING:
@@ -255,11 +279,7 @@ class Mission:
     async def _look_for_the_end(self) -> None:
         """Found, searched enough, too little energy, or nobody looking?"""
         settings, place = self.settings, self.search.place
-        if place.probability >= settings.search.found_at and self.search.was_hit(place):
-            self.found = Found.at(self.frame, place)
-            await self._write("found", vars(self.found))
-            lat, lon = self.found.lat, self.found.lon
-            await self.happen(Event.CONFIRMED, f"found at {lat:.6f}, {lon:.6f}, p = {place.probability:.4f}")
+        if await self.finding.look():
             return
         if place.probability >= SUSPECT_AT:
             await self.happen(Event.SUSPECT, f"a place with probability {place.probability:.0%}")
@@ -307,7 +327,7 @@ class Mission:
 
     def _energy_low(self) -> str:
         """Why the aircraft must fly home now, or nothing."""
-        return energy_objection(self.vehicle.telemetry, self.flight_time(), self.settings.flight)
+        return self.homeward.energy.objection(self.flight_time(), self.settings.flight)
 
     async def _stop_searching(self, event: Event) -> None:
         self.searched = True
@@ -327,9 +347,18 @@ class Mission:
             decision, self._thinking = self._thinking.result(), None
             navigator.decide(decision.path)
             await self._decided(decision)
+        if self.finding.hovers():
+            if not self._hovering:
+                self._hovering = True
+                self._drop_thought()
+                await self.helm.hover(wanted=lambda: self.state in FLYING)
+            return
+        if self._hovering:
+            self._hovering = False
+            navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
         thinking_s = self.settings.search.deadline_s * self.clock.speedup
         if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
-            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes.verdict]
+            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes]
             self._thinking = asyncio.create_task(
                 self.search.decide(navigator.waypoint, navigator.heading, unseen)
             )
@@ -346,9 +375,9 @@ class Mission:
 
     def observed(self, observation: Observation, arrived: float) -> None:
         """An observation was applied (called by the intake): a hit asks for a new decision at once."""
-        if not observation.hits.any():
+        if not observation.speaking:
             return
-        for lat, lon in self.frame.to_latlon(observation.cells[observation.hits]):
+        for lat, lon in self.frame.to_latlon(observation.speaking):
             self.flight.hits.append((float(lat), float(lon)))
         if self.state in FLYING:
             self._drop_thought()
@@ -362,7 +391,7 @@ class Mission:
     async def _go_home(self) -> None:
         """Fly home around what must not be flown over, then let the autopilot land."""
         if self.vehicle.telemetry.guided and not self._direct:
-            for point in self.helm.route(self.search.grid.launch)[:-1]:
+            for point in self.helm.route(self.helm.home())[:-1]:
                 if not await self._fly_to(point):
                     return
         await self._command(self.vehicle.return_to_launch(), "return to launch")
@@ -381,14 +410,14 @@ class Mission:
     async def _fly_to(self, point: LatLon) -> bool:
         """Fly straight to a point; False when the state changed on the way."""
         state = self.state
-        sent = await self._send(point)
+        sent = await self._send(point, on_way=True)
         while self.state == state:
             if self.helm.distance(self.helm.here(), point) <= self.settings.flight.corner_m:
                 return True
             if not sent or self._resend:
                 await self.clock.sleep(RETRY_S)
                 self._resend = False
-                sent = self.state == state and await self._send(point)
+                sent = self.state == state and await self._send(point, on_way=True)
             await self._tick()
         return False
 
@@ -397,12 +426,15 @@ class Mission:
     async def _guard(self) -> None:
         """Ten times a second: can the position be trusted, is the waypoint flown, is there too much wind?"""
         while True:
+            if self.journal.failed is not None:  # told to somebody else, who does not fly
+                raise self._journal_lost(self.journal.failed)
+            self.homeward.update()
             trouble = self.helm.trouble(moving=self.state in MOVING)
             if trouble is not None and self.state in (*MOVING, State.HOLDING):
                 await self.hold(trouble.cause, trouble.reason)
-            if self.state in FLYING and (windy := self.helm.too_windy()):
-                self.why_stopped = windy
-                await self.happen(Event.RETURN, windy)
+            if self.state in FLYING and (why := self.helm.too_windy() or self.helm.strayed()):
+                self.why_stopped = why
+                await self.happen(Event.RETURN, why)
             await self.clock.sleep(TICK_S)
 
     async def _watch(self) -> None:
@@ -425,7 +457,8 @@ class Mission:
             if why and not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
                 self.why_here += f"; {why}"
                 await self._write("yielded", {"reason": why})
-            if self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
+            told = not self.vehicle.events_waiting  # else why it landed may be among what is still to be read
+            if told and self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
                 why = f"landed before the search was over: {self.why_here}"
                 said = self._takeovers.said()  # often told only after the mode has changed
                 self.why_stopped = self.why_stopped or why + (said if said not in why else "")
@@ -457,9 +490,9 @@ class Mission:
 
     # ---- commands ----------------------------------------------------------------------------------------
 
-    async def _send(self, point: LatLon) -> bool:
+    async def _send(self, point: LatLon, *, on_way: bool = False) -> bool:
         """Send the aircraft to a point; hold when something speaks against it. False when it was not sent."""
-        refusal = await self.helm.send(point)
+        refusal = await self.helm.send(point, on_way=on_way)
         if refusal is None:
             self.flight.waypoints += 1
         elif refusal.cause in ("position", "limits"):
@@ -480,7 +513,10 @@ class Mission:
         try:
             await self.journal.append(self.clock.now(), kind, body)
         except (sqlite3.Error, OSError) as error:
-            raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
+            raise self._journal_lost(error) from error
+
+    def _journal_lost(self, error: Exception) -> JournalLost:
+        return JournalLost(f"the journal {self.journal.path} cannot be written: {error}")
 
     async def _decided(self, decision: Decision) -> None:
         self.flight.decisions += 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,12 @@ from service.feed import Moment
 from service.flight import LatLon
 from service.journal import Row, read_meta, read_rows
 from service.reports import Receipt, Report
-from service.resume import stored_settings
-from service.run import AREA, JOURNAL, PRIOR, read_ground, sensor_of
+from service.resume import retrace, stored_settings
 from service.search import Search
+from service.sensors import make_sensor
 from service.states import FINAL, FLYING, State
+from service.survey import AREA, JOURNAL, PRIOR, survey
+from service.suspects import Sightings
 
 KEPT = 32  # copies of the belief along the run, to go back to
 TRACK_EVERY_S = 1.0
@@ -52,6 +55,16 @@ class _Told:
     curve: int = 1
 
 
+@dataclass(frozen=True)
+class _Kept:
+    """The search before a row."""
+
+    row: int
+    belief: Belief
+    record: DetectionRecord
+    sightings: Sightings
+
+
 class ReplayView(BaseView):
     """A run's folder, looked at; it is set to a time by `seek` and stands at the end at first.
 
@@ -63,11 +76,11 @@ class ReplayView(BaseView):
         journal = folder / JOURNAL
         settings = stored_settings(journal, {})
         prior = folder / PRIOR
-        area, grid = read_ground(folder / AREA, prior if prior.exists() else None, settings)
+        area, grid = survey(folder / AREA, prior if prior.exists() else None, settings)
         if read_meta(journal, "grid") != grid.frame.to_dict():
             raise BadInput(f"{folder}: its journal is of another grid than its area file makes")
         search = Search(grid, settings)
-        super().__init__(area, search, sensor_of(search, settings), settings)
+        super().__init__(area, search, make_sensor(settings, grid, search.fov), settings)
         self.registry = CollectorRegistry()
         self.rows = list(read_rows(journal))
         if not self.rows:
@@ -77,7 +90,7 @@ class ReplayView(BaseView):
         self._hits: list[LatLon] = []
         self._curve = PosCurve()
         self._told: list[_Told] = []
-        self._kept: list[tuple[int, Belief, DetectionRecord]] = []
+        self._kept: list[_Kept] = []
         self._read()
         self._at = len(self.rows)
 
@@ -96,12 +109,11 @@ class ReplayView(BaseView):
         """Show the run as it was at a time."""
         goal = max(1, bisect_right(self.times, time))
         if goal < self._at:
-            number, belief, record = self._kept[bisect_right(self._kept, goal, key=lambda each: each[0]) - 1]
-            self.search.go_back(belief.copy(), copy.deepcopy(record))
-            self._at = number
+            kept = self._kept[bisect_right(self._kept, goal, key=lambda each: each.row) - 1]
+            self.search.go_back(kept.belief.copy(), copy.deepcopy(kept.record), copy.deepcopy(kept.sightings))
+            self._at = kept.row
         for row in self.rows[self._at : goal]:
-            if row.kind == "report" and row.body["observation"] is not None:
-                self.search.apply(Observation.from_dict(row.body["observation"]))
+            retrace(row, self.search)
         self._at = goal
 
     def _read(self) -> None:
@@ -110,7 +122,11 @@ class ReplayView(BaseView):
         told, tracked = _Told(), -np.inf
         for number, (row, time) in enumerate(zip(self.rows, self.times, strict=True)):
             if number % every == 0:
-                self._kept.append((number, self.search.belief.copy(), copy.deepcopy(self.search.record)))
+                belief, record, sightings = self.search.belief, self.search.record, self.search.sightings
+                self._kept.append(
+                    _Kept(number, belief.copy(), copy.deepcopy(record), copy.deepcopy(sightings))
+                )
+            retrace(row, self.search)
             told = copy.copy(told)
             if row.kind == "report":
                 if time - tracked >= TRACK_EVERY_S:
@@ -124,12 +140,11 @@ class ReplayView(BaseView):
 
     def _take_report(self, told: _Told, row: Row, time: float) -> None:
         told.reports += 1
-        lat, lon, height_m, heading_deg = row.body["pose"]
+        lat, lon, height_m, heading_deg = row.body["pose"][:4]
         told.pose = Pose(lat, lon, height_m, heading_deg, time)
         if row.body["observation"] is None:
             return
         observation = Observation.from_dict(row.body["observation"])
-        self.search.apply(observation)
         places = self.search.grid.frame.to_latlon(observation.cells[observation.hits])
         self._hits += [(float(lat), float(lon)) for lat, lon in places]
         self._curve.add(time, self.search.record.pos)
@@ -152,6 +167,7 @@ class ReplayView(BaseView):
             "speedup": 1.0,
             "pos": self.search.record.pos,
             "place": self.place(),
+            "suspects": self.search.sightings.suspects(self.search.belief.probability()),
             "outside": self.search.belief.outside,
             "steps": told.decisions,
             "flight_time_s": flown,
@@ -213,11 +229,11 @@ class ReplayView(BaseView):
         """A replay takes no reports."""
         return False
 
-    async def submit(self, report: Report) -> Receipt:
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
         """A replay takes no reports."""
-        return Receipt(id=report.id, status="refused", reason="this is a replay")
+        return [Receipt(id=each.id, status="refused", reason="this is a replay") for each in reports]
 
-    async def order(self, command: str) -> str:
+    async def order(self, command: str, place: LatLon | None = None) -> str:
         """A replay takes no orders."""
         return self._told[-1].state
 

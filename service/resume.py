@@ -7,15 +7,27 @@ from pathlib import Path
 from typing import Any
 
 from service.config import Settings, changed_settings
+from service.errors import BadInput
 from service.evidence import Observation
 from service.intake import Intake
-from service.journal import read_meta, read_rows
+from service.journal import Row, read_meta, read_rows
 from service.search import Search
+from service.verdict import ROW as VERDICT
 
 
 def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
     """The settings that a run was started with, but for those `changed` ('section.key': value; None: as stored)."""
     return changed_settings(read_meta(journal, "settings"), changed, str(journal))
+
+
+def retrace(row: Row, search: Search) -> None:
+    """Apply what a journal row says about the ground, if anything, to a search; rows come in their order."""
+    if row.kind == VERDICT:
+        down, across = row.body["cell"]
+        said = Observation.from_dict(row.body["observation"])
+        search.judge((down, across), said, confirmed=row.body["confirmed"])
+    elif row.kind == "report" and row.body["observation"] is not None:
+        search.apply(Observation.from_dict(row.body["observation"]))
 
 
 def replay(
@@ -24,16 +36,21 @@ def replay(
     intake: Intake,
     told: Callable[[float, float], None] = lambda time, pos: None,
 ) -> int:
-    """Apply the journalled observations to a fresh search, in their order; returns how many reports there were.
+    """Apply the journalled observations and verdicts to a fresh search, in their order.
 
-    `told` hears the time of each observation and the POS after it.
+    `told` hears the time of each row and the POS after it. Returns how many reports there were.
     """
     ids = set()
-    for row in read_rows(journal, "report"):
-        ids.add(row.body["report"]["id"])
-        if row.body["observation"] is not None:
-            search.apply(Observation.from_dict(row.body["observation"]))
-            told(row.time, search.record.pos)
+    for row in read_rows(journal, "report", VERDICT):
+        try:
+            retrace(row, search)
+            if row.kind == "report":
+                ids.add(row.body["report"]["id"])
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise BadInput(
+                f"{journal}: row {row.seq} is no {row.kind} that this version knows ({error})"
+            ) from error
+        told(row.time, search.record.pos)
     intake.remember(ids)
     intake.accepted = len(ids)
     return len(ids)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from prometheus_client import CollectorRegistry, Gauge, Histogram
@@ -14,7 +16,7 @@ from service.clock import Clock
 from service.config import Settings
 from service.curve import PosCurve
 from service.estimate import Estimator
-from service.evidence import Pose, Sensor
+from service.evidence import Pose, finite_or_level
 from service.feed import Moment
 from service.flight import LatLon
 from service.intake import Intake
@@ -22,6 +24,7 @@ from service.journal import read_last
 from service.mission import Mission
 from service.reports import Receipt, Report
 from service.search import Search
+from service.sensors import Profile
 from service.states import FINAL, State
 
 UNDER_WAY = (State.SEARCHING, State.CONFIRMING, State.HOLDING)
@@ -33,7 +36,7 @@ class RunView(BaseView):
     """What can be seen of a run; `mission` and `intake` are there once the link is open."""
 
     def __init__(
-        self, area: SearchArea, search: Search, sensor: Sensor, settings: Settings, clock: Clock
+        self, area: SearchArea, search: Search, sensor: Profile, settings: Settings, clock: Clock
     ) -> None:
         super().__init__(area, search, sensor, settings)
         self.clock = clock
@@ -61,18 +64,20 @@ class RunView(BaseView):
             ("roisearch_link_quality", "Part of the last heartbeats that came in time", self._link_quality),
             ("roisearch_battery_percent", "State of charge as the autopilot tells it", self._battery),
             ("roisearch_steps", "Cells flown", lambda: self.mission.flight.steps if self.mission else 0),
+            ("roisearch_tasks", "Tasks of the event loop", lambda: len(asyncio.all_tasks())),
         ):
             Gauge(name, about, registry=self.registry).set_function(value)
 
-    async def submit(self, report: Report) -> Receipt:
-        """A detector report from the door."""
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        """Detector reports from a door."""
         if self.intake is None:
-            return Receipt(id=report.id, status="refused", reason="the service is still starting")
-        return await self.intake.submit(report)
+            why = "the service is still starting"
+            return [Receipt(id=report.id, status="refused", reason=why) for report in reports]
+        return await self.intake.submit_all(reports)
 
-    async def order(self, command: str) -> str:
+    async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
         """An operator's order from the door."""
-        return State.WAITING.value if self.mission is None else await self.mission.order(command)
+        return State.WAITING.value if self.mission is None else await self.mission.order(command, place)
 
     def ready(self) -> bool:
         """True while a search can take reports."""
@@ -92,6 +97,8 @@ class RunView(BaseView):
                 telemetry.alt_home_m,
                 telemetry.heading_deg if math.isfinite(telemetry.heading_deg) else 0.0,
                 telemetry.position_time,
+                finite_or_level(telemetry.pitch_deg),
+                finite_or_level(telemetry.roll_deg),
             )
         flown = mission.flight_time() if mission else 0.0
         found = mission.found if mission else None
@@ -104,10 +111,11 @@ class RunView(BaseView):
             "speedup": self.clock.speedup,
             "pos": record.pos,
             "place": self.place(),
+            "suspects": self.search.sightings.suspects(self.search.belief.probability()),
             "outside": self.search.belief.outside,
             "steps": mission.flight.steps if mission else 0,
             "flight_time_s": flown,
-            "flight_left_s": self._flight_left(flown, telemetry.battery_percent if telemetry else None),
+            "flight_left_s": self._flight_left(flown),
             "battery_percent": telemetry.battery_percent if telemetry else None,
             "mode": telemetry.mode if telemetry else None,
             "reason": mission.reason.text if mission else "starting",
@@ -165,13 +173,10 @@ class RunView(BaseView):
         percent = self.mission.vehicle.telemetry.battery_percent if self.mission else None
         return math.nan if percent is None else percent
 
-    def _flight_left(self, flown: float, battery: float | None) -> float | None:
-        """Seconds until the battery reaches its limit at the consumption so far; None while unknown."""
-        if battery is None or flown < 30.0 or battery >= 99.0:
-            return None
-        spare = battery - self.settings.flight.min_battery_percent
-        left = max(0.0, spare * flown / (100.0 - battery))
-        return min(left, max(0.0, self.settings.flight.max_flight_s - flown))
+    def _flight_left(self, flown: float) -> float | None:
+        """Seconds until the way home must begin, for the battery or the time; None while unknown."""
+        left = self.mission.homeward.energy.seconds_left(self.settings.flight) if self.mission else None
+        return None if left is None else min(left, max(0.0, self.settings.flight.max_flight_s - flown))
 
     def decisions(self, count: int) -> list[dict[str, Any]]:
         """The last decisions with their reasons and options, the newest first, from the journal."""

@@ -11,6 +11,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "bench": ("sim.bench", "the planner against its plain twin, as ratios"),
     "detector": ("sim.detector", "a simulated detector that follows the aircraft"),
     "flights": ("sim.flights", "whole searches with the real service, counted"),
+    "soak": ("sim.soak.cli", "flights under random faults, with everything judged that must never happen"),
     "trials": ("sim.trials.cli", "planners over many priors: steps, detection curves, figures, report"),
 }
 

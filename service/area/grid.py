@@ -45,6 +45,7 @@ class Grid:
         launch: (latitude, longitude) where the search starts and ends.
         start: the flyable cell (row, col) nearest to the launch point.
         keep_out: the exclusions on the plane, for `leg_is_clear` and `way_home`.
+        outline: the area as drawn, on the plane.
         layout_notes: what the operator should know about the layout; see `notes`.
     """
 
@@ -57,6 +58,7 @@ class Grid:
     launch: LatLon
     start: tuple[int, int]
     keep_out: KeepOut
+    outline: shapely.Geometry
     layout_notes: tuple[str, ...]
 
     @property
@@ -154,6 +156,7 @@ def build_grid(
         launch=home,
         start=nearest_flyable(frame, flyable, home),
         keep_out=blocked,
+        outline=frame.flatten(area.polygon),
         layout_notes=notes,
     )
 

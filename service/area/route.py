@@ -34,11 +34,13 @@ class KeepOut:
         zone: the exclusions grown by the clearance; a leg must not touch it.
         corners: float [k, 2], where a route may bend, all outside the zone.
         shell: a slightly larger zone, whose edge is where one leaves it by the nearest way.
+        core: the exclusions as drawn.
     """
 
     zone: shapely.Geometry
     corners: FloatArray
     shell: shapely.Geometry
+    core: shapely.Geometry
 
     def clear(self, start: FloatArray, ends: FloatArray) -> BoolArray:
         """Which straight legs from a point [2] to points [k, 2] stay outside the zone, bool [k]."""
@@ -67,7 +69,7 @@ def keep_out(frame: GridFrame, exclusions: Sequence[Exclusion], clearance_m: flo
     shapely.prepare(zone)
     corners = np.unique(corners, axis=0)
     outside = ~shapely.intersects_xy(zone, corners[:, 0], corners[:, 1])
-    return KeepOut(zone, corners[outside], shapely.buffer(flat, clearance_m + _SPARE_M))
+    return KeepOut(zone, corners[outside], shapely.buffer(flat, clearance_m + _SPARE_M), flat)
 
 
 def shortest_route(blocked: KeepOut, start: FloatArray, end: FloatArray) -> list[FloatArray] | None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from fastapi import Body, FastAPI, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
+from fastapi.openapi.models import Example
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from starlette.middleware.cors import CORSMiddleware
@@ -24,7 +25,7 @@ from service.http.page import FOLDER, Parts, policy
 from service.http.rate import Buckets
 from service.http.run import PastRun, Run
 from service.intake import JournalLost
-from service.reports import Command, Receipt, Report
+from service.reports import EXAMPLES, Command, Receipt, Report
 from service.underlay import NO_UNDERLAY, Underlay
 
 At = Annotated[
@@ -98,7 +99,7 @@ def create_app(
     )
     async def reports(
         request: Request,
-        body: Annotated[Report | list[Report], Body(openapi_examples=examples.REPORTS)],
+        body: Annotated[Report | list[Report], Body(openapi_examples=openapi_examples(EXAMPLES))],
     ) -> list[Receipt]:
         only_live()
         batch = body if isinstance(body, list) else [body]
@@ -108,16 +109,18 @@ def create_app(
         wait = buckets.take(who, http.reports_per_s, time.monotonic(), len(batch))
         if wait:
             raise too_many(http.reports_per_s, wait)
-        return list(await asyncio.gather(*(run.submit(report) for report in batch)))
+        return await run.submit_all(batch)
 
     @app.post(
-        "/api/commands", summary="Give an order: hold, resume, return or abort", responses=examples.ORDERED
+        "/api/commands",
+        summary="Give an order: hold, resume, return or abort; confirm or reject a place",
+        responses=examples.ORDERED,
     )
     async def commands(
         command: Annotated[Command, Body(openapi_examples=examples.COMMANDS)],
     ) -> dict[str, str]:
         only_live()
-        return {"state": await run.order(command.command)}
+        return {"state": await run.order(command.command, command.place)}
 
     def then(at: float | None) -> Run:
         if at is None:
@@ -210,6 +213,12 @@ def create_app(
 
     app.mount("/page", Parts(directory=FOLDER))
     return app
+
+
+def openapi_examples(examples: Mapping[str, Any]) -> dict[str, Example]:
+    """Examples by what they say, and all of them as one batch."""
+    single: dict[str, Example] = {name: {"summary": name, "value": value} for name, value in examples.items()}
+    return {**single, "a batch": {"summary": "a batch", "value": list(examples.values())}}
 
 
 def complaints(error: RequestValidationError) -> list[dict[str, Any]]:

@@ -12,7 +12,8 @@ Schema = dict[str, Any]
 HEAD = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>roisearch API</title>
-<link rel="icon" href="/page/icon.svg" type="image/svg+xml"><link rel="stylesheet" href="/page/docs.css"></head><body><main>
+<link rel="icon" href="/page/icon.svg" type="image/svg+xml">
+<link rel="stylesheet" href="/page/docs.css"></head><body><main>
 """
 EVENTS = """<section aria-labelledby="events"><h2 id="events"><code>WS /api/events</code></h2>
 <p>The run as it happens, for pages. Offer the subprotocol <code>roisearch</code> and, where a token is needed,

@@ -4,31 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-REPORTS: dict[str, Any] = {
-    "nothing seen": {
-        "summary": "One frame with nothing in it: what clears the ground",
-        "value": {"id": "cam-000117", "captured_at": 1771236123.40, "detections": []},
-    },
-    "somebody seen": {
-        "summary": "One frame with a person",
-        "value": {
-            "id": "cam-000118",
-            "captured_at": 1771236123.90,
-            "detections": [{"class": "person", "score": 0.82, "lat": 56.609142, "lon": -4.739255}],
-        },
-    },
-    "several frames": {
-        "summary": "Several frames at once, one of them blurred",
-        "value": [
-            {"id": "cam-000119", "captured_at": 1771236124.40},
-            {"id": "cam-000120", "captured_at": 1771236124.90, "usable": False},
-        ],
-    },
-}
 COMMANDS: dict[str, Any] = {
     "hold": {"summary": "Hover", "value": {"command": "hold"}},
     "resume": {"summary": "Go on with the search", "value": {"command": "resume"}},
     "return": {"summary": "Fly home and land", "value": {"command": "return"}},
+    "reject": {
+        "summary": "What was seen there is not the target",
+        "value": {"command": "reject", "lat": 56.609142, "lon": -4.739255},
+    },
 }
 
 
@@ -69,6 +52,7 @@ STATE = answers(
         "link": {"up": True, "silent_s": 0.4, "received": 0.998},
         "detector": {"silent_s": 0.3, "silent": False},
         "regions": [0.28, 0.17, 0.12],
+        "suspects": [{"lat": 56.60914, "lon": -4.73925, "probability": 0.21, "thumbnail": None, "hits": 1}],
         "found": None,
     }
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -57,11 +58,11 @@ class Run(Protocol):
         """True while a search can take reports."""
         ...
 
-    async def submit(self, report: Report) -> Receipt:
-        """A detector report."""
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        """Detector reports."""
         ...
 
-    async def order(self, command: str) -> str:
+    async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
         """An operator's order; the state after it."""
         ...
 

@@ -209,6 +209,12 @@ class LinkCore:
         self._control.lose(reason)
         self._stand_down(reason, now)
 
+    def stand_by(self, reason: str, now: float) -> None:
+        """What was sent is not wanted any more: nothing that moves the aircraft is repeated."""
+        self._wake(now)
+        self._done(self._book.cancel(reason, now, only_motion=True))
+        self._watch.clear()
+
     def reposition(self, lat: float, lon: float, alt_amsl_m: float, now: float) -> Target:
         """Send the aircraft to a place; the next one replaces it.
 

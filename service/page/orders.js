@@ -87,7 +87,7 @@ function suspectItem(each, mayOrder, onShow) {
   const buttons = [show];
   if (mayOrder) {
     const confirm = make("button", { type: "button", textContent: "Confirm", className: "go" });
-    confirm.addEventListener("click", () => give("confirm"));
+    confirm.addEventListener("click", () => give("confirm", { lat: each.lat, lon: each.lon }));
     const reject = make("button", { type: "button", textContent: "Reject" });
     reject.addEventListener("click", () => give("reject", { lat: each.lat, lon: each.lon }));
     buttons.push(confirm, reject);
@@ -96,13 +96,16 @@ function suspectItem(each, mayOrder, onShow) {
   return item;
 }
 
+/** What the detector gave as a picture: the image itself, or an address elsewhere, which only a click asks. */
 function picture(thumbnail) {
+  if (/^https?:/.test(thumbnail))
+    return make("a", { href: thumbnail, target: "_blank", rel: "noreferrer", textContent: "Picture" });
   const image = make("img", { alt: "what the camera saw" });
-  if (thumbnail.startsWith("data:")) image.src = thumbnail;
+  if (thumbnail.startsWith("data:image/")) image.src = thumbnail;
   else if (thumbnail.startsWith("/"))
     ask(thumbnail)
       .then(async (answer) => (image.src = URL.createObjectURL(await answer.blob())))
       .catch(() => image.remove());
-  else image.src = "data:image/jpeg;base64," + thumbnail;
+  else return "";
   return image;
 }

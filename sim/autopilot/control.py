@@ -85,8 +85,8 @@ async def serve(
                 flush()
                 writer.write(json.dumps(reply).encode() + b"\n")
                 await writer.drain()
-        except ConnectionError:
-            return  # the client went away in the middle of a line
+        except (ConnectionError, asyncio.CancelledError):
+            return  # the client went away in the middle of a line, or the mock ends
         finally:
             writer.close()
 

@@ -14,8 +14,9 @@ import httpx
 from service.journal import Row, read_rows
 from sim.autopilot.control import Control
 from sim.autopilot.process import AutopilotProcess
-from tests.integration.flight import FIELD, Process, running, service_words, write_area
-from tests.integration.tap import Tap
+from sim.soak.process import Process
+from sim.soak.tap import Tap
+from tests.integration.flight import FIELD, running, service_words, write_area
 
 SPEEDUP = 10.0
 TARGET = "47.0508,8.3017"
@@ -23,6 +24,7 @@ SETTINGS = """
 [flight]
 altitude_m = 15
 settle_s = {settle_s}
+margin_m = {margin_m}
 [sensor]
 cell_m = 20
 p_tn = 0.99
@@ -129,6 +131,8 @@ def flight(
     *,
     speedup: float = SPEEDUP,
     settle_s: float = 3.0,
+    margin_m: float = 30.0,
+    module: str = "service",
     target: str | None = None,
     options: tuple[str, ...] = (),
 ) -> Iterator[Scene]:
@@ -140,12 +144,12 @@ def flight(
         control = stack.enter_context(Control(autopilot.control))
         tap = stack.enter_context(Tap(autopilot.port))
         file = folder / "settings.toml"
-        file.write_text(SETTINGS.format(settle_s=settle_s), encoding="utf-8")
+        file.write_text(SETTINGS.format(settle_s=settle_s, margin_m=margin_m), encoding="utf-8")
         area = write_area(folder, FIELD if target else plain(FIELD))
         runs = folder / "runs"
         words = service_words(area, runs, "--connect", tap.url, "--takeoff", "--config", str(file))
         words[words.index("--speedup") + 1] = str(speedup)
-        service = stack.enter_context(running(*words))
+        service = stack.enter_context(running(module, *words[1:]))
         address = service.wait_for(r"listening on (http://\S+)").group(1)
         door = stack.enter_context(httpx.Client(base_url=address, timeout=30.0))
         where = ["--p-tn", "0.99", *(["--target", target] if target else [])]

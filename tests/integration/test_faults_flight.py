@@ -24,8 +24,27 @@ def test_a_low_battery_flies_home_and_says_so(tmp_path: Path) -> None:
     assert "battery" in report["stopped_because"]
 
 
-def test_a_wind_that_it_cannot_fly_against_is_noticed(tmp_path: Path) -> None:
+def test_it_flies_home_while_the_battery_has_what_that_needs(tmp_path: Path) -> None:
+    with flight(tmp_path, options=("--endurance", "5")) as scene:
+        scene.searching()
+        row = scene.reaches("RETURNING", "the way home")
+        assert "needs" in row.body["reason"]
+        assert scene.control.state()["battery_percent"] > 25  # well before the fixed minimum
+        code, report = scene.ends()
+        assert code == 3
+        assert report["stopped_because"] == row.body["reason"]
+        assert 10 <= scene.control.state()["battery_percent"] <= 40  # the reserve, and no more than it
+
+
+def test_an_aircraft_that_is_blown_out_of_the_area_flies_home(tmp_path: Path) -> None:
     with flight(tmp_path, "ardupilot") as scene:
+        scene.searching()
+        scene.control.fault("wind", east=-20.0, seconds=20.0)
+        scene.reaches("RETURNING", "outside the area and its margin")
+
+
+def test_a_wind_that_it_cannot_fly_against_is_noticed(tmp_path: Path) -> None:
+    with flight(tmp_path, "ardupilot", margin_m=5000.0) as scene:
         scene.searching()
         scene.control.fault("wind", east=-20.0)
         scene.reaches("HOLDING", "no progress towards the waypoint")

@@ -44,7 +44,7 @@ def test_flags_win_over_environment_and_environment_over_file(tmp_path: Path) ->
         ("[sensor]\np_tp = 1.5\n", ["sensor.p_tp", "1.5", "less than 1"]),
         (
             "[sensor]\nprofile = 'fisheye'\n",
-            ["sensor.profile", "fisheye", "'point', 'donut' or 'wide-angle'"],
+            ["sensor.profile", "fisheye", "'wide-angle' or 'camera'"],
         ),
         ("[sensor\n", ["is not TOML", "line 1"]),
     ],

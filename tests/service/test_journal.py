@@ -10,10 +10,25 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from service.errors import BadInput
-from service.journal import Duplicate, Journal, read_rows
+from service.journal import Duplicate, Journal, read_meta, read_rows
+
+
+def filled(path: Path, rows: int) -> Path:
+    """A closed journal with some rows."""
+    journal = Journal(path)
+    journal.set_meta("settings", {"a": 1})
+
+    async def write() -> None:
+        for n in range(rows):
+            await journal.append(float(n), "look", {"n": n, "text": "3" * n}, key=f"k{n}")
+
+    asyncio.run(write())
+    journal.close()
+    return path
 
 
 def test_rows_come_back_in_order_with_every_bit_of_their_numbers(tmp_path: Path) -> None:
@@ -29,6 +44,21 @@ def test_rows_come_back_in_order_with_every_bit_of_their_numbers(tmp_path: Path)
     rows = list(read_rows(tmp_path / "j.sqlite"))
     assert [row.body["p"] for row in rows] == numbers
     assert [row.kind for row in read_rows(tmp_path / "j.sqlite", "start")] == ["start"]
+
+
+def test_who_stops_waiting_neither_loses_the_row_nor_the_journal(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "j.sqlite")
+
+    async def write() -> None:
+        for n in range(50):
+            waiting = asyncio.create_task(journal.append(0.0, "given up", {"n": n}))
+            await asyncio.sleep(0)
+            waiting.cancel()
+        await asyncio.wait_for(journal.append(1.0, "after", {}), timeout=60)
+
+    asyncio.run(write())
+    journal.close()
+    assert [row.kind for row in read_rows(tmp_path / "j.sqlite")] == ["given up"] * 50 + ["after"]
 
 
 def test_a_key_is_taken_once_even_among_many_written_together(tmp_path: Path) -> None:
@@ -73,8 +103,117 @@ def test_a_journal_of_another_schema_is_refused(tmp_path: Path) -> None:
     Journal(path).close()
     with sqlite3.connect(path) as database:
         database.execute("UPDATE meta SET value = '99' WHERE key = 'schema'")
-    with pytest.raises(BadInput, match="schema 99"):
+    for reading in (lambda: Journal(path), lambda: read_meta(path, "settings")):
+        with pytest.raises(
+            BadInput, match=r"schema 99, this version reads 1 to 2; resume it with the version"
+        ):
+            reading()
+
+
+def test_a_journal_without_checksums_is_brought_up_to_this_schema(tmp_path: Path) -> None:
+    path = filled(tmp_path / "j.sqlite", 5)
+    rows = list(read_rows(path))
+    with sqlite3.connect(path) as database:
+        database.execute("ALTER TABLE events DROP COLUMN crc")
+        database.execute("UPDATE meta SET value = '1' WHERE key = 'schema'")
+    assert list(read_rows(path)) == rows
+    journal = Journal(path)
+    asyncio.run(journal.append(9.0, "look", {"n": 9}))
+    journal.close()
+    again = Journal(path)
+    assert again.meta("schema") == 2
+    again.close()
+    assert [row.seq for row in read_rows(path)] == [1, 2, 3, 4, 5, 6]
+    assert list(read_rows(path))[:5] == rows
+
+
+@pytest.mark.parametrize("damage", ["flip", "cut"])
+def test_a_damaged_journal_is_refused_and_never_believed(damage: str, tmp_path: Path) -> None:
+    """Whatever byte is flipped, wherever the file ends: the same rows, or a clear refusal."""
+    whole = filled(tmp_path / "whole.sqlite", 40)
+    rows, content = list(read_rows(whole)), whole.read_bytes()
+    rng, refused = np.random.default_rng(5), 0
+    for number in range(120):
+        where = int(rng.integers(0, len(content)))
+        broken = bytearray(content)
+        if damage == "flip":
+            broken[where] ^= 1 << int(rng.integers(0, 8))
+        else:
+            del broken[where:]
+        path = tmp_path / f"{number}.sqlite"
+        path.write_bytes(broken)
+        try:
+            assert read_meta(path, "settings") == {"a": 1}
+            Journal(path).close()
+            kept = list(read_rows(path))
+        except BadInput:
+            refused += 1
+        else:
+            assert kept == rows, f"{damage} at {where}"
+    assert refused >= 10
+
+
+def test_a_row_that_was_taken_out_is_missed(tmp_path: Path) -> None:
+    path = filled(tmp_path / "j.sqlite", 9)
+    with sqlite3.connect(path) as database:
+        database.execute("DELETE FROM events WHERE seq = 4")
+    with pytest.raises(BadInput, match="row 4 is missing"):
         Journal(path)
+
+
+def test_a_changed_digit_is_noticed(tmp_path: Path) -> None:
+    path = filled(tmp_path / "j.sqlite", 9)
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE events SET body = replace(body, '3', '4') WHERE seq = 4")
+    with pytest.raises(BadInput, match="row 4 is not what was written"):
+        Journal(path)
+
+
+def test_a_full_disk_is_told_to_the_writer_and_remembered_and_nothing_half_written_stays(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "j.sqlite"
+    journal = Journal(path)
+    journal._database.execute("PRAGMA max_page_count = 12")
+
+    written = 0
+
+    async def write() -> None:
+        nonlocal written
+        for written in range(10_000):
+            await journal.append(0.0, "look", {"n": written, "text": "x" * 500}, key=str(written))
+
+    with pytest.raises(sqlite3.Error, match="full"):
+        asyncio.run(write())
+    assert "full" in str(journal.failed)
+    journal.close()
+    Journal(path).close()  # whole, as far as it goes
+    assert [row.body["n"] for row in read_rows(path)] == list(range(written))
+
+
+def test_a_folder_that_cannot_be_written_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="cannot be opened"):
+        Journal(Path("/proc/j.sqlite"))
+    path = filled(tmp_path / "j.sqlite", 3)
+    script = f"""
+import os, sys
+from pathlib import Path
+from service.errors import BadInput
+from service.journal import Journal
+if os.geteuid() == 0:
+    os.setuid(65534)  # root may write anywhere
+try:
+    Journal(Path({str(path)!r}))
+except BadInput as error:
+    sys.exit(str(error))
+"""
+    tmp_path.chmod(0o555)
+    path.chmod(0o444)
+    for parent in tmp_path.parents[:2]:
+        parent.chmod(0o755)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    tmp_path.chmod(0o755)
+    assert (done.returncode, "cannot be opened" in done.stderr) == (1, True), done.stderr
 
 
 def test_a_file_that_is_no_journal_is_refused(tmp_path: Path) -> None:

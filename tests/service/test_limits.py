@@ -12,7 +12,6 @@ from service.limits import (
     Lasting,
     PositionTrust,
     Progress,
-    energy_objection,
     position_objections,
     wind_objection,
 )
@@ -134,9 +133,3 @@ def test_wind_counts_when_it_is_told_is_too_much_and_lasts() -> None:
     assert lasting.after("storm", 0.0) == lasting.after("storm", 4.9) == ""
     assert lasting.after("", 5.0) == lasting.after("storm", 6.0) == ""
     assert lasting.after("storm", 11.0) == "storm"
-
-
-def test_energy_is_low_by_charge_or_by_time() -> None:
-    assert energy_objection(replace(GOOD, battery_percent=21.0), 100.0, FLIGHT) == ""
-    assert "battery at 20 %" in energy_objection(replace(GOOD, battery_percent=20.0), 100.0, FLIGHT)
-    assert "7200 s in the air" in energy_objection(GOOD, 7200.0, FLIGHT)

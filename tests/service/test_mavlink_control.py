@@ -318,6 +318,20 @@ def test_a_pause_drops_the_repetitions_of_motion_commands() -> None:
 
 
 @FLAVORS
+def test_nothing_is_repeated_that_is_not_wanted_any_more(flavor: str) -> None:
+    rig = Rig(flavor).flying()
+    go(rig)
+    rig.core.request(rig.autopilot.change_speed(3.0), rig.now)
+    rig.forget()
+    rig.core.stand_by("the mission holds", rig.now)
+    rig.run(30.0)
+    assert rig.motion() == []
+    assert rig.of(TargetNotTaken) == []
+    go(rig)
+    assert len(rig.motion()) == 1
+
+
+@FLAVORS
 def test_motion_command_is_not_repeated_while_the_vehicle_is_not_heard(flavor: str) -> None:
     rig = Rig(flavor, link_lost_s=60.0, command_attempts=50).flying()
     rig.core.request(rig.autopilot.return_to_launch(), rig.now)

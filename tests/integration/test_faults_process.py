@@ -1,0 +1,67 @@
+"""What can happen to our own process in flight: it stands still, or its disk is full."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from service.journal import read_rows
+from tests.integration.scene import Scene, flight
+from tests.integration.stalling import STALL_S
+
+pytestmark = pytest.mark.timeout(300)
+STALLING = "tests.integration.stalling"
+
+
+def stand_still(scene: Scene) -> int:
+    """Stop the event loop; returns how many motion commands were sent before."""
+    scene.service.process.send_signal(signal.SIGUSR1)
+    scene.service.wait_for("standing still")
+    return len(scene.tap.motions)
+
+
+def test_after_a_stall_nothing_is_sent_on_what_was_known_before(tmp_path: Path) -> None:
+    """What waits in the socket is as old as the stall: with nothing newer on the link, nothing may be sent."""
+    with flight(tmp_path, "ardupilot", speedup=3.0, module=STALLING) as scene:
+        scene.searching()
+        motions = stand_still(scene)
+        time.sleep(0.6 * STALL_S)
+        scene.control.fault("link_lost", seconds=4.5 * scene.speedup)
+        time.sleep(0.4 * STALL_S + 1.0)  # it is awake again, and hears nobody
+        assert scene.tap.motions[motions:] == [], scene.service.said
+        scene.moves_again()
+
+
+def test_a_pilot_who_took_over_during_a_stall_has_the_aircraft(tmp_path: Path) -> None:
+    with flight(tmp_path, "px4", speedup=3.0, module=STALLING) as scene:
+        scene.searching()
+        motions = stand_still(scene)
+        time.sleep(0.4 * STALL_S)
+        scene.control.fault("pilot")
+        scene.reaches("YIELDED", "POSCTL")
+        scene.fly(10.0)
+        assert scene.tap.motions[motions:] == [], scene.service.said
+
+
+def test_a_full_disk_in_flight_stops_the_aircraft_and_tells_the_pilot(tmp_path: Path) -> None:
+    with flight(tmp_path) as scene:
+        scene.searching()
+        written = max(path.stat().st_size for path in scene.journal.parent.glob("journal.sqlite*"))
+        limits = resource.prlimit(scene.service.process.pid, resource.RLIMIT_FSIZE)
+        resource.prlimit(scene.service.process.pid, resource.RLIMIT_FSIZE, (written, limits[1]))
+        code, report = scene.ends()
+        assert code == 4
+        assert "cannot be written" in report["stopped_because"]
+        assert [name for _, name in scene.tap.motions][-1] == "MAV_CMD_DO_REPOSITION"
+        assert any(text.startswith("search ABORTED, hovering: the journal") for text in scene.tap.texts)
+        scene.fly(10.0)
+        state = scene.control.state()
+        assert state["armed"]
+        assert state["speed"] < 1.0
+    assert "Traceback" not in scene.service.said
+    numbers = [row.seq for row in read_rows(scene.journal)]
+    assert numbers == list(range(1, len(numbers) + 1))

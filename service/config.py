@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from service.errors import BadInput
+from service.toml_lines import key_lines
 
 PlannerName = Literal[
     "puct-regions-lite",
@@ -80,21 +82,40 @@ class FlightSettings(Section):
 
 
 class SensorSettings(Section):
-    profile: Literal["point", "donut", "wide-angle"] = "point"
+    profile: Literal["point", "donut", "wide-angle", "camera"] = "point"
     horizontal_fov_deg: float = Field(default=62.0, gt=5, lt=170)
     vertical_fov_deg: float = Field(default=55.0, gt=5, lt=170)
     overlap: float = Field(default=0.2, ge=0, lt=0.9)
     cell_m: float | None = Field(default=None, gt=0.5, le=1000)
     p_tp: float = Field(default=0.9, gt=0, lt=1)
     p_tn: float = Field(default=0.9, gt=0, lt=1)
+    calibration_file: str = ""
     min_covered: float = Field(default=0.8, gt=0, le=1)
     silent_after_s: float = Field(default=10.0, gt=0)
+    hover_look_s: float = Field(default=0.0, ge=0, le=3600)
+    camera_pitch_deg: float = Field(default=-90.0, ge=-90, le=0)
+    camera_yaw_deg: float = Field(default=0.0, ge=-180, le=180)
+    camera_roll_deg: float = Field(default=0.0, ge=-180, le=180)
+    camera_stabilised: bool = True
+    image_width_px: int = Field(default=1920, ge=16, le=100_000)
+    image_height_px: int = Field(default=1080, ge=16, le=100_000)
+    target_size_m: float = Field(default=0.9, gt=0, le=100)
+    half_seen_px: float = Field(default=8.0, gt=0, le=1000)
+    min_p_tp: float = Field(default=0.2, gt=0, lt=1)
+    max_range_m: float = Field(default=300.0, gt=1, le=20_000)
+    min_grazing_deg: float = Field(default=10.0, ge=0, lt=90)
+    terrain_file: str = ""
+    attitude_sigma_deg: float = Field(default=1.5, ge=0, le=30)
+    position_sigma_m: float = Field(default=2.0, ge=0, le=1000)
+    height_sigma_m: float = Field(default=2.0, ge=0, le=1000)
 
 
 class SearchSettings(Section):
     planner: PlannerName = "puct-regions-lite"
     deadline_s: float = Field(default=0.038, gt=0, le=5)
     found_at: float = Field(default=0.999, gt=0.5, lt=1)
+    on_found: Literal["return", "hover", "continue"] = "return"
+    reject_reliability: float = Field(default=0.99, gt=0.5, lt=1)
     stop_at_pos: float = Field(default=0.999, gt=0, lt=1)
     max_area_km2: float = Field(default=100.0, gt=0)
     max_steps: int = Field(default=40_000, gt=0)
@@ -111,6 +132,14 @@ class HttpSettings(Section):
     max_batch: int = Field(default=500, ge=1, le=100_000)
     max_body_bytes: int = Field(default=1 << 20, ge=1024, le=1 << 28)
     body_timeout_s: float = Field(default=5.0, gt=0, le=300)
+
+
+class DoorSettings(Section):
+    udp: str = ""
+    unix: str = ""
+    mqtt: str = ""
+    mqtt_topic: str = "roisearch/reports"
+    mqtt_credentials_file: str = ""
 
 
 class RunSettings(Section):
@@ -131,6 +160,7 @@ class Settings(Section):
     sensor: SensorSettings = SensorSettings()
     search: SearchSettings = SearchSettings()
     http: HttpSettings = HttpSettings()
+    doors: DoorSettings = DoorSettings()
     run: RunSettings = RunSettings()
     demo: DemoSettings = DemoSettings()
 
@@ -157,16 +187,65 @@ def _flatten(model: type[BaseModel]) -> dict[str, Any]:
 KNOWN_KEYS: tuple[str, ...] = tuple(_flatten(Settings))
 
 
-def _complaint(error: ValidationError, where: str) -> BadInput:
-    """The first problem pydantic found, as one sentence that names the key and what is allowed."""
-    first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
+def nearest_key(key: str) -> str | None:
+    """The setting that a key which is none most likely means: of the same name elsewhere, or of a similar one."""
+    namesakes = [known for known in KNOWN_KEYS if known.rpartition(".")[2] == key.rpartition(".")[2]]
+    if namesakes:
+        return namesakes[0]
+    known = KNOWN_KEYS if "." in key else (*Settings.model_fields, *KNOWN_KEYS)
+    near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
+    return near[0] if near else None
+
+
+def problems(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Everything that is wrong with settings: pairs of a dotted key and a sentence; empty when nothing is."""
+    try:
+        Settings.model_validate(values)
+    except ValidationError as error:
+        return [_problem(details) for details in error.errors()]
+    return []
+
+
+def _problem(details: Any) -> tuple[str, str]:
+    key = ".".join(str(part) for part in details["loc"])
+    if details["type"] == "extra_forbidden":
+        near = nearest_key(key)
         known = KNOWN_KEYS if "." in key else tuple(Settings.model_fields)
-        near = difflib.get_close_matches(key, known, n=1, cutoff=0.4)
-        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
-        return BadInput(f"{where}: there is no setting '{key}'; {hint}")
-    return BadInput(f"{where}: '{key}' = {first['input']!r} is not possible: {first['msg']}")
+        hint = f"did you mean '{near}'?" if near else f"known are {', '.join(known)}"
+        return key, f"there is no setting '{key}'; {hint}"
+    return key, f"'{key}' = {details['input']!r} is not possible: {details['msg']}"
+
+
+def read_toml(file: Path) -> tuple[dict[str, Any], str]:
+    """The values of a TOML file, and its text; raises BadInput with the line that is wrong."""
+    try:
+        text = file.read_text(encoding="utf-8")
+        return tomllib.loads(text), text
+    except OSError as error:
+        raise BadInput(f"{file}: cannot be read ({error.strerror}); give an existing TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise BadInput(f"{file}{f':{line[1]}' if line else ''}: is not TOML: {error}") from error
+
+
+def file_problems(file: Path) -> list[str]:
+    """Everything that is wrong with a settings file, as sentences with file and line; raises BadInput if no TOML."""
+    values, text = read_toml(file)
+    wrong = problems(values)
+    lines = key_lines(text) if wrong else {}
+
+    def line(key: str) -> int:
+        while key and key not in lines:  # a wrong item of a list stands where the list does
+            key = key.rpartition(".")[0]
+        return lines.get(key, 0)
+
+    found = sorted((line(key), sentence) for key, sentence in wrong)
+    return [f"{file}:{number}: {sentence}" if number else f"{file}: {sentence}" for number, sentence in found]
+
+
+def variable_name(key: str) -> str:
+    """The environment variable that overrides 'section.key'."""
+    return f"ROISEARCH_{key.replace('.', '_')}".upper()
 
 
 def read_settings(
@@ -183,19 +262,13 @@ def read_settings(
     where = "settings"
     if file is not None:
         where = str(file)
-        try:
-            values = tomllib.loads(file.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise BadInput(
-                f"{file}: cannot be read ({error.strerror}); give an existing TOML file"
-            ) from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise BadInput(f"{file}: is not TOML: {error}") from error
-        _check(values, where)
+        values, _ = read_toml(file)
+        if wrong := file_problems(file):
+            raise BadInput(wrong[0])
     variables = os.environ if environment is None else environment
     for dotted in KNOWN_KEYS:
         section, key = dotted.split(".")
-        name = f"ROISEARCH_{section}_{key}".upper()
+        name = variable_name(dotted)
         if name in variables:
             values.setdefault(section, {})[key] = variables[name]
             where = f"environment variable {name}"
@@ -226,7 +299,6 @@ def changed_settings(values: dict[str, Any], changed: Mapping[str, Any], where: 
 
 
 def _check(values: dict[str, Any], where: str) -> Settings:
-    try:
-        return Settings.model_validate(values)
-    except ValidationError as error:
-        raise _complaint(error, where) from error
+    if wrong := problems(values):
+        raise BadInput(f"{where}: {wrong[0][1]}")
+    return Settings.model_validate(values)

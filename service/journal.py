@@ -16,7 +16,7 @@ import queue
 import sqlite3
 import threading
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,7 +70,7 @@ class Journal:
         self.path = path
         self.failed: Exception | None = None
         """The first write that did not succeed."""
-        self._queue: queue.SimpleQueue[_Entry | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[list[_Entry] | None] = queue.SimpleQueue()
         self._closed = False
         self._last = 0
         try:
@@ -123,15 +123,37 @@ class Journal:
 
     def write(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> Future[int]:
         """Queue a row; the future holds its number once it is on disk, or raises Duplicate."""
+        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
+        self._enqueue([entry])
+        return entry.done
+
+    def _enqueue(self, entries: list[_Entry]) -> None:
+        """Queue rows that are written in one transaction: all of them, or none."""
         if self._closed:
             raise RuntimeError("the journal is closed")
-        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
-        self._queue.put(entry)
-        return entry.done
+        for entry in entries:
+            entry.done.set_running_or_notify_cancel()  # who stops waiting does not stop the row from being written
+        self._queue.put(entries)
 
     async def append(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> int:
         """Write a row and return its number once it is on disk; raises Duplicate when `key` is known."""
         return await asyncio.wrap_future(self.write(time, kind, body, key))
+
+    async def append_all(self, rows: Sequence[tuple[float, str, str, str]]) -> list[bool]:
+        """Write rows of (time, kind, key, body as JSON) in one transaction; returns when they are on disk.
+
+        Returns for each whether it is new; raises what kept them from being written, and then none is.
+        """
+        entries = [_Entry(time, kind, key, body, Future()) for time, kind, key, body in rows]
+        if not entries:
+            return []
+        self._enqueue(entries)
+        await asyncio.wait([asyncio.wrap_future(entries[-1].done)])  # the outcomes come in their order
+        failures = [entry.done.exception() for entry in entries]
+        for failure in failures:
+            if failure is not None and not isinstance(failure, Duplicate):
+                raise failure
+        return [failure is None for failure in failures]
 
     def close(self) -> None:
         """Write what is queued, then close the file."""
@@ -149,7 +171,7 @@ class Journal:
             while not self._queue.empty():
                 batch.append(self._queue.get())
             open_ = None not in batch
-            self._commit([entry for entry in batch if entry is not None])
+            self._commit([entry for entries in batch if entries is not None for entry in entries])
 
     def _commit(self, entries: list[_Entry]) -> None:
         outcomes: list[tuple[_Entry, int | Exception]] = []
@@ -223,20 +245,35 @@ def read_meta(path: Path, key: str) -> Any:
 
 
 def _open_to_read(path: Path) -> sqlite3.Connection:
+    """A reader beside the writer, if there is one: in WAL mode neither waits for the other."""
     if not path.is_file():
         raise BadInput(f"{path}: there is no journal here; give the folder of a run")
-    return sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+    address = path.resolve().as_uri()
+    database = sqlite3.connect(f"{address}?mode=ro", uri=True)
+    try:
+        database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError:  # a finished run where not even SQLite's own files may be written
+        if path.with_name(path.name + "-wal").exists():
+            return database
+        database.close()
+        database = sqlite3.connect(f"{address}?mode=ro&immutable=1", uri=True)
+    except (sqlite3.Error, UnicodeDecodeError):  # the latter when the damage is in what SQLite wants to say
+        pass  # whoever reads is told
+    return database
 
 
 def read_rows(path: Path, *kinds: str) -> Iterator[Row]:
-    """The rows of a journal in order, of the given kinds or all; raises BadInput when it cannot be read."""
+    """The rows of a journal in order, of the given kinds or all, as they were when the first was read.
+
+    Raises BadInput when it cannot be read.
+    """
     database = _open_to_read(path)
     try:
         where = f"WHERE kind IN ({', '.join('?' * len(kinds))})" if kinds else ""
         query = f"{_ROWS} FROM events {where} ORDER BY seq"
         for seq, time, kind, key, body in database.execute(query, kinds):
             yield Row(seq, time, kind, key, json.loads(body))
-    except sqlite3.Error as error:
+    except (sqlite3.Error, ValueError) as error:
         raise BadInput(f"{path}: the journal cannot be read ({error})") from error
     finally:
         database.close()

@@ -19,7 +19,8 @@ from roisearch import Decision
 from service.clock import Clock
 from service.config import Settings
 from service.evidence import Observation
-from service.flight import Flight, Found, LatLon
+from service.finding import Finding
+from service.flight import Flight, LatLon
 from service.helm import LEAST_PATIENCE_WALL_S, Helm
 from service.homeward import Homeward
 from service.intake import Intake, JournalLost
@@ -30,6 +31,7 @@ from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTake
 from service.navigator import Cell, Navigator
 from service.search import Reason, Search
 from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
+from service.suspects import Found
 from service.takeover import Takeovers
 
 log = logging.getLogger("roisearch")
@@ -77,6 +79,7 @@ class Mission:
         self._homeward = False  # a hold on the way home goes on home
         self._direct = False  # the way home is the autopilot's own: ours could not be flown
         self._resend = False  # the last waypoint may have been lost
+        self._hovering = False  # over a suspect, for another look
         self._refused = 0  # waypoints in a row that were not flown
         self._takeovers = Takeovers()
         fly = settings.flight
@@ -87,6 +90,7 @@ class Mission:
         self._changed = asyncio.Event()
         self._wake = asyncio.Event()
         self._group = asyncio.TaskGroup()
+        self.finding = Finding(self, write=self._write, tick=self._tick, energy_low=self._energy_low)
         self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
         self.homeward = Homeward(self.helm, clock, fly)
 
@@ -140,11 +144,15 @@ class Mission:
         if not self._holds:
             await self.happen(Event.RETURN if self._homeward else Event.RESUME, reason)
 
-    async def order(self, command: str) -> str:
-        """An operator's order: hold, resume, return or abort. Returns what came of it, in words."""
-        await self._write("order", {"command": command, "state": self.state})
+    async def order(self, command: str, place: LatLon | None = None) -> str:
+        """An operator's order: hold, resume, return or abort; confirm or reject a place, the present one unless
+        given. Returns the state that came of it."""
+        await self._write("order", {"command": command, "state": self.state, "place": place})
         try:
-            await self._obey(command)
+            if command in ("confirm", "reject"):
+                await self.finding.judge(place, confirmed=command == "confirm")
+            else:
+                await self._obey(command)
         except LinkError as error:
             log.warning("%s: %s", command, error)
             self.vehicle.status_text(f"search {self.state}: {command} failed: {error}")
@@ -241,7 +249,7 @@ class Mission:
         if self.state in FLYING:
             await self._search()
         elif self.state == State.FOUND:
-            await self.happen(Event.RETURN, "found: flying home")
+            await self.finding.wait_over_the_place()
         elif self.state == State.RETURNING:
             await self._go_home()
         elif self.state == State.HOLDING:
@@ -269,11 +277,7 @@ class Mission:
     async def _look_for_the_end(self) -> None:
         """Found, searched enough, too little energy, or nobody looking?"""
         settings, place = self.settings, self.search.place
-        if place.probability >= settings.search.found_at and self.search.was_hit(place):
-            self.found = Found.at(self.frame, place)
-            await self._write("found", vars(self.found))
-            lat, lon = self.found.lat, self.found.lon
-            await self.happen(Event.CONFIRMED, f"found at {lat:.6f}, {lon:.6f}, p = {place.probability:.4f}")
+        if await self.finding.look():
             return
         if place.probability >= SUSPECT_AT:
             await self.happen(Event.SUSPECT, f"a place with probability {place.probability:.0%}")
@@ -341,9 +345,18 @@ class Mission:
             decision, self._thinking = self._thinking.result(), None
             navigator.decide(decision.path)
             await self._decided(decision)
+        if self.finding.hovers():
+            if not self._hovering:
+                self._hovering = True
+                self._drop_thought()
+                await self.helm.hover(wanted=lambda: self.state in FLYING)
+            return
+        if self._hovering:
+            self._hovering = False
+            navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
         thinking_s = self.settings.search.deadline_s * self.clock.speedup
         if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
-            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes.verdict]
+            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes]
             self._thinking = asyncio.create_task(
                 self.search.decide(navigator.waypoint, navigator.heading, unseen)
             )
@@ -360,9 +373,9 @@ class Mission:
 
     def observed(self, observation: Observation, arrived: float) -> None:
         """An observation was applied (called by the intake): a hit asks for a new decision at once."""
-        if not observation.hits.any():
+        if not observation.speaking:
             return
-        for lat, lon in self.frame.to_latlon(observation.cells[observation.hits]):
+        for lat, lon in self.frame.to_latlon(observation.speaking):
             self.flight.hits.append((float(lat), float(lon)))
         if self.state in FLYING:
             self._drop_thought()
@@ -442,7 +455,8 @@ class Mission:
             if why and not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
                 self.why_here += f"; {why}"
                 await self._write("yielded", {"reason": why})
-            if self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
+            told = not self.vehicle.events_waiting  # else why it landed may be among what is still to be read
+            if told and self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
                 why = f"landed before the search was over: {self.why_here}"
                 said = self._takeovers.said()  # often told only after the mode has changed
                 self.why_stopped = self.why_stopped or why + (said if said not in why else "")

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from service.area import Grid
+from service.area.frame import GridFrame
 
 LatLon = tuple[float, float]
 
@@ -59,7 +60,7 @@ def draw_scene(scene: Scene) -> bytes:
     figure.colorbar(pod, ax=right, shrink=0.8, label="probability of detection so far")
     right.set_title("how well it has been searched", fontsize=10)
     for axes, line in ((left, "white"), (right, "black")):
-        _outline_regions(axes, scene, line)
+        outline_regions(axes, frame, scene.labels, line)
         _paths(axes, scene, line)
         blocked = np.where(grid.flyable, np.nan, 1.0)
         axes.imshow(blocked, extent=extent, cmap="Greys", vmin=0.0, vmax=1.6, alpha=0.35)
@@ -75,18 +76,18 @@ def draw_scene(scene: Scene) -> bytes:
     return buffer.getvalue()
 
 
-def _outline_regions(axes: Axes, scene: Scene, colour: str) -> None:
-    """The border of each region of interest, with its number."""
-    cell = scene.grid.frame.cell_m
-    labels = np.pad(scene.labels, 1)
+def outline_regions(axes: Axes, frame: GridFrame, regions: NDArray[np.integer[Any]], colour: str) -> None:
+    """The border of each region of interest (int [rows, cols], 0 for none) in metres of the grid, with its number."""
+    cell = frame.cell_m
+    labels = np.pad(regions, 1)
     segments = []
     for row, col in np.argwhere(labels[1:, 1:-1] != labels[:-1, 1:-1]):  # between row - 1 and row
         segments.append(((col * cell, row * cell), ((col + 1) * cell, row * cell)))
     for row, col in np.argwhere(labels[1:-1, 1:] != labels[1:-1, :-1]):
         segments.append(((col * cell, row * cell), (col * cell, (row + 1) * cell)))
     axes.add_collection(LineCollection(segments, colors=colour, linewidths=0.8, alpha=0.8))
-    for label in range(1, int(scene.labels.max()) + 1):
-        row, col = (np.argwhere(scene.labels == label).mean(axis=0) + 0.5) * cell
+    for label in range(1, int(regions.max()) + 1):
+        row, col = (np.argwhere(regions == label).mean(axis=0) + 0.5) * cell
         axes.text(col, row, str(label), color=colour, fontsize=8, ha="center", va="center")
 
 

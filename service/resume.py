@@ -9,8 +9,9 @@ from service.config import Settings, changed_settings
 from service.errors import BadInput
 from service.evidence import Observation
 from service.intake import Intake
-from service.journal import read_meta, read_rows
+from service.journal import Row, read_meta, read_rows
 from service.search import Search
+from service.verdict import ROW as VERDICT
 
 
 def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
@@ -18,17 +19,30 @@ def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
     return changed_settings(read_meta(journal, "settings"), changed, str(journal))
 
 
+def retrace(row: Row, search: Search) -> None:
+    """Apply what a journal row says about the ground, if anything, to a search; rows come in their order."""
+    if row.kind == VERDICT:
+        down, across = row.body["cell"]
+        said = Observation.from_dict(row.body["observation"])
+        search.judge((down, across), said, confirmed=row.body["confirmed"])
+    elif row.kind == "report" and row.body["observation"] is not None:
+        search.apply(Observation.from_dict(row.body["observation"]))
+
+
 def replay(journal: Path, search: Search, intake: Intake) -> int:
-    """Apply the journalled observations to a fresh search, in their order; returns how many reports there were."""
+    """Apply the journalled observations and verdicts to a fresh search, in their order.
+
+    Returns how many reports there were.
+    """
     ids = set()
-    for row in read_rows(journal, "report"):
+    for row in read_rows(journal, "report", VERDICT):
         try:
-            ids.add(row.body["report"]["id"])
-            if row.body["observation"] is not None:
-                search.apply(Observation.from_dict(row.body["observation"]))
+            retrace(row, search)
+            if row.kind == "report":
+                ids.add(row.body["report"]["id"])
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise BadInput(
-                f"{journal}: row {row.seq} is no report that this version knows ({error})"
+                f"{journal}: row {row.seq} is no {row.kind} that this version knows ({error})"
             ) from error
     intake.remember(ids)
     intake.accepted = len(ids)

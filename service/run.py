@@ -11,51 +11,49 @@ import re
 import shutil
 import signal
 import time
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from service.area import Grid, SearchArea, build_grid, read_area, read_geotiff_prior
+from service.area import Grid, SearchArea
+from service.calibration import calibration_of
 from service.clock import Clock
 from service.config import Settings
 from service.demo import World
+from service.doors import Doors, open_doors
 from service.errors import BadInput
-from service.evidence import Observation, Pose, Sensor
+from service.evidence import Observation, Pose
 from service.http import Door, open_door
 from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
 from service.mission import Mission
+from service.passes import Passes
 from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
 from service.search import Search
+from service.sensors import Profile, make_sensor
 from service.states import FINAL, State
+from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.view import RunView
 
 log = logging.getLogger("roisearch")
 EXIT_CODES = {"found": 0, "not_found": 3, "aborted": 4}
-AREA, PRIOR, JOURNAL = "area.geojson", "prior.tif", "journal.sqlite"
-
-
-def cell_size(settings: Settings) -> float:
-    """The cell size in metres: as given, else the footprint's shorter side less the overlap."""
-    if settings.sensor.cell_m is not None:
-        return settings.sensor.cell_m
-    angle = min(settings.sensor.horizontal_fov_deg, settings.sensor.vertical_fov_deg)
-    footprint = 2.0 * settings.flight.altitude_m * math.tan(math.radians(angle / 2.0))
-    return round(footprint * (1.0 - settings.sensor.overlap), 1)
 
 
 def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     """Run a search from its area file to the ground; returns the exit code. Raises BadInput before it starts."""
     console = Console()
     set_up_logging(console)
-    area, grid = _survey(area_file, prior_file, settings)
+    area, grid = survey(area_file, prior_file, settings)
+    _tell(area, grid)
+    calibration_of(settings)  # a wrong table is told before anything starts
     signing_key = _signing_key(settings)
-    with contextlib.closing(open_door(settings.http, os.environ)) as door:
+    with _open(settings) as (door, doors):
         folder = _new_folder(Path(settings.run.folder), area.name)
         shutil.copyfile(area_file, folder / AREA)
         if prior_file is not None:
@@ -63,7 +61,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
         journal = Journal(folder / JOURNAL)
         journal.set_meta("grid", grid.frame.to_dict())
         journal.set_meta("settings", settings.model_dump())
-        return _search(area, grid, settings, folder, journal, door, signing_key, console)
+        return _search(area, grid, settings, folder, journal, door, doors, signing_key, console)
 
 
 def resume(folder: Path, changed: dict[str, Any]) -> int:
@@ -72,29 +70,36 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
     set_up_logging(console)
     settings = stored_settings(folder / JOURNAL, changed)
     prior_file = folder / PRIOR
-    area, grid = _survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
+    area, grid = survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
+    _tell(area, grid)
+    calibration_of(settings)  # a wrong table is told before anything starts
     signing_key = _signing_key(settings)
-    with contextlib.closing(open_door(settings.http, os.environ)) as door:
+    with _open(settings) as (door, doors):
         journal = Journal(folder / JOURNAL)
         if journal.meta("grid") != grid.frame.to_dict():
             raise BadInput(
                 f"{folder}: its journal is of another grid than its area file makes; resume it unchanged"
             )
-        return _search(area, grid, settings, folder, journal, door, signing_key, console)
+        return _search(area, grid, settings, folder, journal, door, doors, signing_key, console)
 
 
-def _survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tuple[SearchArea, Grid]:
-    """The area and its grid, with what a person should know about them."""
-    area = read_area(area_file, max_area_km2=settings.search.max_area_km2)
-    grid = build_grid(area, cell_size(settings))
-    if prior_file is not None:
-        grid = grid.with_prior(read_geotiff_prior(prior_file, grid.frame, grid.covered))
+@contextlib.contextmanager
+def _open(settings: Settings) -> Iterator[tuple[Door, Doors]]:
+    """Take every address before anything starts, and give them up at the end; raises BadInput."""
+    with (
+        contextlib.closing(open_door(settings.http, os.environ)) as door,
+        contextlib.closing(open_doors(settings.doors)) as doors,
+    ):
+        yield door, doors
+
+
+def _tell(area: SearchArea, grid: Grid) -> None:
+    """What a person should know about the area and its grid."""
     rows, cols = grid.frame.shape
     log.info("area: %s, %d cells of %g m to search", area.name, grid.searchable.sum(), grid.frame.cell_m)
     log.info("grid: %d x %d, turned to %.0f° true", rows, cols, grid.frame.bearing_deg)
     for note in grid.notes:
         log.info("note: %s", note)
-    return area, grid
 
 
 def _signing_key(settings: Settings) -> bytes | None:
@@ -115,16 +120,18 @@ def _search(
     folder: Path,
     journal: Journal,
     door: Door,
+    doors: Doors,
     signing_key: bytes | None,
     console: Console,
 ) -> int:
     """Compile the planner and fly."""
     try:
         search = Search(grid, settings)
+        sensor = make_sensor(settings, grid, search.fov)
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
-        service = Service(area, search, settings, folder, console)
-        return asyncio.run(service.fly(door, journal, signing_key))
+        service = Service(area, search, sensor, settings, folder, console)
+        return asyncio.run(service.fly(door, doors, journal, signing_key))
     finally:
         journal.close()
 
@@ -159,29 +166,28 @@ class Service:
     """A search from its first process to the last file it leaves."""
 
     def __init__(
-        self, area: SearchArea, search: Search, settings: Settings, folder: Path, console: Console
+        self,
+        area: SearchArea,
+        search: Search,
+        sensor: Profile,
+        settings: Settings,
+        folder: Path,
+        console: Console,
     ) -> None:
         self.area, self.search, self.settings = area, search, settings
         self.folder, self.console = folder, console
         self.clock = Clock(settings.speedup)
         self.world: World | None = None
-        self.sensor = Sensor(
-            frame=search.grid.frame,
-            fov=search.fov,
-            p_tp=settings.sensor.p_tp,
-            p_tn=settings.sensor.p_tn,
-            overlap=settings.sensor.overlap,
-            min_covered=settings.sensor.min_covered,
-            height_m=settings.flight.altitude_m,
-        )
+        self.sensor = sensor
         self.view = RunView(area, search, self.sensor, settings, self.clock)
 
-    async def fly(self, door: Door, journal: Journal, signing_key: bytes | None) -> int:
+    async def fly(self, door: Door, doors: Doors, journal: Journal, signing_key: bytes | None) -> int:
         """Start everything, fly, and write the results; returns the exit code."""
         began = time.time()
         door, guest_token = door.with_guest()
         server = door.server(self.view)
         serving = asyncio.create_task(server.run_until_told())
+        listening = asyncio.create_task(doors.serve(self.view.submit_all))
         try:
             connect = await self._start_world()
             link = self._link_settings(signing_key)
@@ -196,6 +202,8 @@ class Service:
         finally:
             await asyncio.sleep(0.3 if self.world is not None else 0.0)  # let the detector read the end
             server.should_exit = True
+            listening.cancel()
+            await asyncio.wait([listening])
             await serving
             if self.world is not None:
                 await self.world.stop()
@@ -217,12 +225,16 @@ class Service:
             pose = vehicle.pose_at(moment)
             if pose is None or not mission.helm.trust.trusted_at(moment):
                 return None
-            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment)
+            attitude = (pose.pitch_deg, pose.roll_deg)
+            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment, *attitude)
 
         def observed(observation: Observation, arrived: float) -> None:
             mission.observed(observation, arrived)
 
-        intake = Intake(self.search, self.sensor, journal, self.clock, pose_at, observed)
+        intake = Intake(
+            self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
+        )
+        intake.passes = Passes(again_s=self.settings.sensor.hover_look_s or math.inf)
         mission = Mission(
             settings=self.settings,
             clock=self.clock,

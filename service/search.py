@@ -15,19 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch import Belief, Decision, FieldOfView, Regions, SearchState, make_planner, segment_regions
+from roisearch import Belief, Decision, Regions, SearchState, make_planner, segment_regions
 from roisearch.detection import DetectionRecord
-from roisearch.place import Place, most_likely_place
+from roisearch.place import Place, most_likely_place, place_at
 from service.area import Grid
 from service.config import Settings
 from service.evidence import Observation
+from service.sensors import field_of_view
+from service.suspects import Found, Sightings
 
 Cell = tuple[int, int]
-FIELDS_OF_VIEW: dict[str, Callable[[], FieldOfView]] = {
-    "point": FieldOfView.point,
-    "donut": FieldOfView.donut,
-    "wide-angle": FieldOfView.wide_angle,
-}
 
 
 @dataclass(frozen=True)
@@ -47,7 +44,7 @@ class Search:
         self.belief = Belief(grid.prior, searchable=grid.searchable, outside=grid.outside)
         self.record = DetectionRecord(grid.prior, grid.outside)
         self.regions: Regions = segment_regions(self.belief.probability(), searchable=grid.searchable)
-        self.fov = FIELDS_OF_VIEW[settings.sensor.profile]()
+        self.fov = field_of_view(settings, grid.frame.cell_m)
         self.planner = make_planner(
             settings.search.planner, fov=self.fov, flyable=grid.flyable, regions=self.regions
         )
@@ -55,7 +52,9 @@ class Search:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
         self._rng = np.random.default_rng(settings.run.seed)
         self._place: Place | None = None
-        self._hits: set[Cell] = set()
+        self.sightings = Sightings(grid.frame)
+        self.confirmed: Cell | None = None
+        """The place that an operator said is the target's."""
 
     def warm_up(self, progress: Callable[[str, int, int], None] | None = None) -> None:
         """Compile what the planner needs; `progress(name, done, total)` is told."""
@@ -65,13 +64,38 @@ class Search:
         """Update the belief, exactly, and the record of looks."""
         self.belief.observe(observation.cells, observation.hits, observation.p_tp, observation.p_tn)
         self.record.look(observation.cells[observation.first], observation.p_tp[observation.first])
-        self._hits.update((row, col) for row, col in observation.cells[observation.hits].tolist())
+        self.sightings.add(observation.speaking, observation.sightings)
         self._place = None
+
+    def judge(self, cell: Cell, observation: Observation, *, confirmed: bool) -> None:
+        """Take in what an operator says about the place around `cell`."""
+        self.apply(observation)
+        if confirmed:
+            self.confirmed = cell
+        else:
+            self.sightings.forget(cell)
+            self.confirmed = None
+
+    def cell_at(self, place: tuple[float, float] | None) -> Cell:
+        """The cell of a position (latitude, longitude), the nearest one when it is off the grid; without one, that
+        of the present most likely place."""
+        if place is None:
+            return self.place.cell
+        row, col = np.clip(self.grid.frame.to_cells([place])[0], 0, np.array(self.grid.frame.shape) - 1)
+        return int(row), int(col)
+
+    def found(self) -> Found | None:
+        """Where the target is, when an operator has confirmed it or the posterior passes `search.found_at`."""
+        place = self.place
+        if self.confirmed is not None:
+            place = place_at(self.belief.probability(), self.confirmed)
+        elif place.probability < self.settings.search.found_at or not self.was_hit(place):
+            return None
+        return Found.at(self.grid.frame, place, self.sightings.at(place.cell))
 
     def was_hit(self, place: Place) -> bool:
         """True when a detection was ever reported at `place` or beside it: a sharp prior alone finds nobody."""
-        row, col = place.cell
-        return any((row + r, col + c) in self._hits for r in (-1, 0, 1) for c in (-1, 0, 1))
+        return self.sightings.near(place.cell)
 
     @property
     def place(self) -> Place:
@@ -81,12 +105,11 @@ class Search:
         return self._place
 
     async def decide(self, cell: Cell, heading: str, ahead: Sequence[Cell]) -> Decision:
-        """A decision from `cell`, as if the cells `ahead` will have been looked at in vain; in a worker thread."""
+        """A decision from `cell`, as if the looks from `ahead` will have been in vain; in a worker thread."""
         thought = self.belief.copy()
         for step in ahead:
-            cells = self.fov.cells(step, heading, self.grid.frame.shape)
-            sensor = self.settings.sensor
-            thought.observe(cells, np.zeros(len(cells), dtype=np.bool_), sensor.p_tp, sensor.p_tn)
+            cells, p_tp, p_tn = self.fov.looks(step, heading, self.grid.frame.shape)
+            thought.observe(cells, np.zeros(len(cells), dtype=np.bool_), p_tp, p_tn)
         state = SearchState(cell=cell, heading=heading)
         deadline = self.settings.search.deadline_s
         think = functools.partial(self.planner.plan, thought, state, self._rng, deadline_s=deadline)

@@ -1,10 +1,11 @@
 """The mission's state machine: every state, every event, and what each pair leads to.
 
 A search waits for the aircraft (WAITING), is READY when it may fly, climbs (TAKEOFF), and then alternates
-between SEARCHING and CONFIRMING (a place looks promising: look again). It ends by being FOUND or by having
-searched enough, flies home (RETURNING), and is DONE on the ground. HOLDING is a hover with a reason that can
-pass: the operator asked, the detector is silent, the link is gone. YIELDED means that the pilot has the
-aircraft: nothing that moves it is sent until an operator resumes. ABORTED ends the run where it stands.
+between SEARCHING and CONFIRMING (a place looks promising: look again). It ends by being FOUND, where it may hover
+until an operator decides, or by having searched enough, flies home (RETURNING), and is DONE on the ground. HOLDING is
+a hover with a reason that can pass: the operator asked, the detector is silent, the link is gone. YIELDED means that
+the pilot has the aircraft: nothing that moves it is sent until an operator resumes. ABORTED ends the run where it
+stands.
 
 The table is the machine: `next_state` looks a pair up and does nothing else. A pair that is not in the table
 changes nothing, which is what an event that comes too late should do.
@@ -35,7 +36,8 @@ class Event(StrEnum):
     AIRBORNE = "airborne"  # at search height in the guided mode
     SUSPECT = "suspect"  # one place stands out
     CLEARED = "cleared"  # it no longer does
-    CONFIRMED = "confirmed"  # the posterior passed the threshold
+    CONFIRMED = "confirmed"  # the posterior passed the threshold, or an operator said so
+    REJECTED = "rejected"  # an operator said that what was found is not the target
     SEARCHED = "searched"  # enough of the probability has been looked at
     ENERGY_LOW = "energy low"
     PILOT = "pilot"  # a mode change that was not asked for
@@ -68,10 +70,14 @@ TABLE: dict[tuple[State, Event], State] = {
     (State.YIELDED, Event.RESUME): State.SEARCHING,
     (State.YIELDED, Event.RETURN): State.RETURNING,
     (State.YIELDED, Event.LANDED): State.DONE,
+    (State.FOUND, Event.REJECTED): State.SEARCHING,
     (State.FOUND, Event.RETURN): State.RETURNING,
+    (State.FOUND, Event.ENERGY_LOW): State.RETURNING,
+    (State.FOUND, Event.HOLD): State.HOLDING,
     (State.FOUND, Event.PILOT): State.YIELDED,
     (State.FOUND, Event.LANDED): State.DONE,
     (State.RETURNING, Event.PILOT): State.YIELDED,
+    (State.RETURNING, Event.REJECTED): State.SEARCHING,
     (State.RETURNING, Event.HOLD): State.HOLDING,
     (State.RETURNING, Event.LANDED): State.DONE,
     **{

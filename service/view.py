@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,12 @@ from prometheus_client import CollectorRegistry, Gauge, Histogram
 from service.area import SearchArea
 from service.clock import Clock
 from service.config import Settings
-from service.evidence import Pose, Sensor
+from service.evidence import Pose, finite_or_level
 from service.intake import Intake
 from service.mission import Mission
 from service.reports import Receipt, Report
 from service.search import Search
+from service.sensors import Profile
 from service.states import FINAL, State
 
 
@@ -23,7 +25,7 @@ class RunView:
     """What can be seen of a run; `mission` and `intake` are there once the link is open."""
 
     def __init__(
-        self, area: SearchArea, search: Search, sensor: Sensor, settings: Settings, clock: Clock
+        self, area: SearchArea, search: Search, sensor: Profile, settings: Settings, clock: Clock
     ) -> None:
         self.area, self.search, self.sensor, self.settings, self.clock = area, search, sensor, settings, clock
         self.mission: Mission | None = None
@@ -44,15 +46,16 @@ class RunView:
         ):
             Gauge(name, about, registry=self.registry).set_function(value)
 
-    async def submit(self, report: Report) -> Receipt:
-        """A detector report from the door."""
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        """Detector reports from a door."""
         if self.intake is None:
-            return Receipt(id=report.id, status="refused", reason="the service is still starting")
-        return await self.intake.submit(report)
+            why = "the service is still starting"
+            return [Receipt(id=report.id, status="refused", reason=why) for report in reports]
+        return await self.intake.submit_all(reports)
 
-    async def order(self, command: str) -> str:
+    async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
         """An operator's order from the door."""
-        return State.WAITING.value if self.mission is None else await self.mission.order(command)
+        return State.WAITING.value if self.mission is None else await self.mission.order(command, place)
 
     def ready(self) -> bool:
         """True while a search can take reports."""
@@ -74,6 +77,8 @@ class RunView:
                 telemetry.alt_home_m,
                 telemetry.heading_deg,
                 telemetry.position_time,
+                finite_or_level(telemetry.pitch_deg),
+                finite_or_level(telemetry.roll_deg),
             )
         flown = mission.flight_time() if mission else 0.0
         return {
@@ -84,6 +89,8 @@ class RunView:
             "speedup": self.clock.speedup,
             "pos": record.pos,
             "place": {"lat": float(lat), "lon": float(lon), "probability": place.probability},
+            "suspects": self.search.sightings.suspects(self.search.belief.probability()),
+            "found": vars(mission.found) if mission and mission.found else None,
             "outside": self.search.belief.outside,
             "steps": mission.flight.steps if mission else 0,
             "flight_time_s": flown,
@@ -105,17 +112,23 @@ class RunView:
         return {"accepted": intake.accepted if intake else 0, "refused": intake.refused if intake else 0}
 
     def _footprint(self, pose: Pose | None) -> dict[str, Any]:
-        """The cells that a frame taken now shows, with their corners (north-west first, clockwise)."""
+        """The cells that a frame taken now shows, with their corners (north-west first, clockwise), how much of each is
+        covered, and what a look is worth there; p_tp and p_tn of the footprint are the settings'."""
+        nominal = {"p_tp": self.settings.sensor.p_tp, "p_tn": self.settings.sensor.p_tn}
         if pose is None:
-            return {"counts": False, "covered": 0.0, "cells": []}
+            return {"counts": False, "covered": 0.0, **nominal, "cells": []}
         footprint, frame = self.sensor.footprint(pose), self.search.grid.frame
         corners = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
         cells = []
-        for row, col in footprint.cells.tolist():
+        worth = (footprint.counts, footprint.covered, footprint.p_tp, footprint.p_tn)
+        columns = [column.tolist() for column in (footprint.cells, *worth)]
+        for (row, col), counts, covered, p_tp, p_tn in zip(*columns, strict=True):
             points = frame.to_latlon(np.vstack([[[row, col]], np.array([row, col]) + corners])).tolist()
             centre, around = points[0], points[1:]
-            cells.append({"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around})
-        return {"counts": footprint.counts, "covered": footprint.covered, "cells": cells}
+            where = {"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around}
+            cells.append({**where, "counts": counts, "covered": covered, "p_tp": p_tp, "p_tn": p_tn})
+        best = float(footprint.covered.max(initial=0.0))
+        return {"counts": bool(footprint.counts.any()), "covered": best, **nominal, "cells": cells}
 
     def _flight_left(self, flown: float) -> float | None:
         """Seconds until the way home must begin, for the battery or the time; None while unknown."""

@@ -2,8 +2,8 @@
 
 It knows where the target is and nothing else. It follows the aircraft through the service's public door
 (GET /api/state), draws what a camera with the given true-positive and true-negative probabilities would say about
-each cell of the footprint, and reports it (POST /api/reports). Frames of one pass over a cell repeat that pass's
-verdict, since neighbouring frames of a real camera agree with each other.
+each cell of the footprint, and reports it (POST /api/reports). Frames of one pass over a cell agree with each other, as
+those of a real camera do: one draw decides the pass, and a miss turns into a hit only where a better view makes it one.
 """
 
 from __future__ import annotations
@@ -32,12 +32,13 @@ def contains(corners: Sequence[Sequence[float]], point: Point) -> bool:
 
 
 class Detector:
-    """Draws one verdict per cell and pass. `target` is (lat, lon), or None when there is nothing to find."""
+    """Draws once per cell and pass. `target` is (lat, lon), or None when there is nothing to find."""
 
     def __init__(self, target: Point | None, p_tp: float, p_tn: float, seed: int) -> None:
         self.target, self.p_tp, self.p_tn = target, p_tp, p_tn
         self._rng = np.random.default_rng(seed)
-        self._verdicts: dict[tuple[int, int], bool] = {}
+        self._draws: dict[tuple[int, int], float] = {}
+        self._hits: set[tuple[int, int]] = set()
         self._prefix = uuid.uuid4().hex[:12]
         self._count = 0
 
@@ -45,15 +46,18 @@ class Detector:
         """The report of one frame, from the service's state. A frame between cells reports nothing seen."""
         footprint = state["footprint"]
         cells = {(cell["row"], cell["col"]): cell for cell in footprint["cells"]}
-        for gone in self._verdicts.keys() - cells.keys():
-            del self._verdicts[gone]
+        for gone in self._draws.keys() - cells.keys():
+            del self._draws[gone]
+            self._hits.discard(gone)
         detections = []
-        for key, cell in cells.items() if footprint["counts"] else ():
+        for key, cell in cells.items():
+            if not cell["counts"]:
+                continue
             there = self.target is not None and contains(cell["corners"], self.target)
-            if key not in self._verdicts:
-                chance = self.p_tp if there else 1.0 - self.p_tn
-                self._verdicts[key] = bool(self._rng.random() < chance)
-            if self._verdicts[key]:
+            draw = self._draws.setdefault(key, float(self._rng.random()))
+            if draw < self._chance(cell, footprint, there):
+                self._hits.add(key)
+            if key in self._hits:
                 lat, lon = self.target if there and self.target else (cell["lat"], cell["lon"])
                 detections.append({"class": "target", "score": 0.9, "lat": lat, "lon": lon})
         self._count += 1
@@ -63,6 +67,12 @@ class Detector:
             "captured_at": state["pose"]["time"],
             "detections": detections,
         }
+
+    def _chance(self, cell: dict[str, Any], footprint: dict[str, Any], there: bool) -> float:
+        """P(report) for a cell: as good as the detector is, as well as the camera shows this cell."""
+        if there:
+            return self.p_tp * float(cell["p_tp"]) / float(footprint["p_tp"])
+        return (1.0 - self.p_tn) * (1.0 - float(cell["p_tn"])) / (1.0 - float(footprint["p_tn"]))
 
 
 def follow(client: httpx.Client, detector: Detector, rate_hz: float, patience_s: float) -> int:

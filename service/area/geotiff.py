@@ -19,6 +19,9 @@ _SAMPLES_PER_CELL = 8
 _MAX_CUT = 64
 """A pixel is cut into at most this many parts a side, so a pixel may be this many cells wide."""
 
+POA_BAND = "POA"
+"""Of several bands the one described by this is taken, as in the export of a run."""
+
 _CHUNK = 2_000_000
 """Samples located at once, to bound the memory."""
 
@@ -34,7 +37,7 @@ def read_geotiff_prior(
     as zero. What lies off the grid, or on the uncovered part of a cell, is left out.
 
     Args:
-        path: a single-band GeoTIFF in any CRS.
+        path: a GeoTIFF in any CRS, of one band or with one that is described as POA.
         frame: the grid.
         covered: how much of each cell is ground, float 0..1 or bool [rows, cols]
             (`Grid.covered` or `Grid.searchable`).
@@ -73,8 +76,10 @@ def _read(raster: Any, frame: GridFrame, where: Where) -> FloatArray:
 
     if raster.crs is None:
         raise where.bad("the raster has no coordinate reference system; set one, as with gdal_edit.py -a_srs")
-    if raster.count != 1:
-        raise where.bad(f"the raster has {raster.count} bands; give one band of probabilities")
+    if raster.count != 1 and POA_BAND not in raster.descriptions:
+        raise where.bad(
+            f"the raster has {raster.count} bands; give one band of probabilities, or call that band {POA_BAND}"
+        )
     try:
         to_raster = pyproj.Transformer.from_crs("EPSG:4326", raster.crs.to_wkt(), always_xy=True)
     except pyproj.exceptions.ProjError:
@@ -97,7 +102,8 @@ def _read(raster: Any, frame: GridFrame, where: Where) -> FloatArray:
 
 def _values(raster: Any, window: Any, where: Where) -> FloatArray:
     """The pixels of a window, nodata and NaN as zero; anything else that is no probability is refused."""
-    band = raster.read(1, window=window, masked=True)
+    number = 1 if raster.count == 1 else raster.descriptions.index(POA_BAND) + 1
+    band = raster.read(number, window=window, masked=True)
     if np.iscomplexobj(band):
         raise where.bad("the raster holds complex numbers; give probabilities")
     values = np.asarray(band.astype(np.float64).filled(0.0))

@@ -8,12 +8,13 @@ import hashlib
 import json
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Protocol
 
 from fastapi import Body, FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
+from fastapi.openapi.models import Example
 from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 from starlette.middleware.cors import CORSMiddleware
@@ -23,7 +24,7 @@ from service.http.access import Access
 from service.http.guard import Guard, Refusal, client_of, too_many
 from service.http.rate import Buckets
 from service.intake import JournalLost
-from service.reports import Command, Receipt, Report
+from service.reports import EXAMPLES, Command, Receipt, Report
 
 PAGE = Path(__file__).parents[1] / "page.html"
 _MOST_COMPLAINTS = 8
@@ -39,8 +40,8 @@ class Run(Protocol):
     def map(self) -> dict[str, Any]: ...
     def picture(self) -> bytes: ...
     def ready(self) -> bool: ...
-    async def submit(self, report: Report) -> Receipt: ...
-    async def order(self, command: str) -> str: ...
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]: ...
+    async def order(self, command: str, place: tuple[float, float] | None = None) -> str: ...
 
 
 def create_app(
@@ -83,7 +84,10 @@ def create_app(
         return error.response(request.scope)
 
     @app.post("/api/reports", summary="Report what a detector saw in one frame, or in several")
-    async def reports(request: Request, body: Annotated[Report | list[Report], Body()]) -> list[Receipt]:
+    async def reports(
+        request: Request,
+        body: Annotated[Report | list[Report], Body(openapi_examples=openapi_examples(EXAMPLES))],
+    ) -> list[Receipt]:
         batch = body if isinstance(body, list) else [body]
         if len(batch) > http.max_batch:
             raise Refusal(413, f"a batch has at most {http.max_batch} reports")
@@ -91,11 +95,13 @@ def create_app(
         wait = buckets.take(who, http.reports_per_s, time.monotonic(), len(batch))
         if wait:
             raise too_many(http.reports_per_s, wait)
-        return list(await asyncio.gather(*(run.submit(report) for report in batch)))
+        return await run.submit_all(batch)
 
-    @app.post("/api/commands", summary="Give an order: hold, resume, return or abort")
+    @app.post(
+        "/api/commands", summary="Give an order: hold, resume, return or abort; confirm or reject a place"
+    )
     async def commands(command: Command) -> dict[str, str]:
-        return {"state": await run.order(command.command)}
+        return {"state": await run.order(command.command, command.place)}
 
     @app.get("/api/state", summary="Where the search stands, and the footprint of a frame taken now")
     async def state() -> Response:
@@ -129,6 +135,12 @@ def create_app(
         return HTMLResponse(text, headers={"content-security-policy": page_policy(text)})
 
     return app
+
+
+def openapi_examples(examples: Mapping[str, Any]) -> dict[str, Example]:
+    """Examples by what they say, and all of them as one batch."""
+    single: dict[str, Example] = {name: {"summary": name, "value": value} for name, value in examples.items()}
+    return {**single, "a batch": {"summary": "a batch", "value": list(examples.values())}}
 
 
 def complaints(error: RequestValidationError) -> list[dict[str, Any]]:

@@ -36,6 +36,7 @@ class PoseHistory:
         self._length_s = length_s
         self._poses: list[Pose] = []
         self._times: list[float] = []
+        self._boots: list[float] = []
 
     def __len__(self) -> int:
         return len(self._poses)
@@ -52,6 +53,7 @@ class PoseHistory:
             return
         heading = telemetry.yaw_deg if math.isfinite(telemetry.yaw_deg) else telemetry.heading_deg
         self._times.append(time)
+        self._boots.append(-math.inf if telemetry.boot_time_s is None else telemetry.boot_time_s)
         self._poses.append(
             Pose(
                 time=time,
@@ -68,12 +70,28 @@ class PoseHistory:
         )
         if self._times[0] < time - 1.25 * self._length_s:
             keep = bisect_right(self._times, time - self._length_s)
-            del self._times[:keep], self._poses[:keep]
+            del self._times[:keep], self._poses[:keep], self._boots[:keep]
 
     def clear(self) -> None:
         """Forget everything, as after a reboot of the vehicle."""
         self._poses.clear()
         self._times.clear()
+        self._boots.clear()
+
+    def time_of_boot(self, boot_s: float) -> float | None:
+        """The service's time at the vehicle's time since boot, between the samples that were received around it.
+
+        Up to half a second beyond the newest; None when the past does not reach that far, or the vehicle does not
+        tell its time. What the link delays is in it, as it is in the time of every pose.
+        """
+        if not math.isfinite(boot_s) or not self._boots or not self._boots[0] <= boot_s:
+            return None
+        at = bisect_right(self._boots, boot_s)
+        before, time = self._boots[at - 1], self._times[at - 1]
+        if at == len(self._boots):
+            return time + boot_s - before if boot_s - before <= _LONGEST_GUESS_S else None
+        share = (boot_s - before) / (self._boots[at] - before)
+        return time + share * (self._times[at] - time) if math.isfinite(share) else None
 
     def pose_at(self, time: float) -> Pose | None:
         """The pose at a time, between two samples or carried on from the newest for up to half a second.

@@ -136,6 +136,10 @@ class Vehicle:
         """Where it was at a time of the service's clock, or None if that is not known."""
         return self._core.history.pose_at(time)
 
+    def time_of_boot(self, boot_s: float) -> float | None:
+        """The service's time at its time since boot, or None if that is not known."""
+        return self._core.history.time_of_boot(boot_s)
+
     def why_not_reposition(self) -> str | None:
         """Why `reposition` would refuse now, as a sentence's end, or None."""
         return self._core.why_not_reposition(self._clock.now())
@@ -147,6 +151,11 @@ class Vehicle:
         """
         while (event := await self._queue.get()) is not None:
             yield event
+
+    @property
+    def events_waiting(self) -> bool:
+        """True while `telemetry` is ahead of what the reader of `events` has been told."""
+        return not self._queue.empty()
 
     async def wait_until(self, condition: Callable[[Telemetry], bool], timeout_s: float) -> bool:
         """Wait until what is known fulfils a condition; False if it did not in time."""

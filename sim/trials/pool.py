@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from multiprocessing.synchronize import Event
 from typing import Any
 
 from sim.trials.campaign import Campaign, Job
@@ -32,26 +33,34 @@ def executor(jobs: int, scheduler: str = "") -> Iterator[tuple[Executor, int]]:
         with _cluster(scheduler) as answer:
             yield answer
         return
-    pool = ProcessPoolExecutor(
-        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_the_campaign
-    )
+    spawn = multiprocessing.get_context("spawn")
+    stop = spawn.Event()
+    pool = ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_end_with_the_campaign, initargs=(stop,))
     try:
         yield pool, jobs
+    except BaseException:
+        stop.set()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _end_with_the_campaign() -> None:
-    """Let Ctrl-C, and the end of the campaign however it comes, end a worker at once and without a word."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def _end_with_the_campaign(stop: Event) -> None:
+    """Let the end of the campaign, told by `stop` or by the end of its process, end a worker at once.
+
+    Ctrl-C reaches every process of a terminal: a worker that died of it before the campaign has noticed would look
+    like one that broke.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
+    assert parent is not None
 
-    def watch() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
+    def watch(wait: Callable[[], object]) -> None:
+        wait()
+        os._exit(1)
 
-    threading.Thread(target=watch, daemon=True).start()
+    for wait in (parent.join, stop.wait):
+        threading.Thread(target=watch, args=(wait,), daemon=True).start()
 
 
 @contextmanager

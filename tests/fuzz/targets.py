@@ -11,7 +11,7 @@ import atexit
 import json
 import tempfile
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -208,8 +208,8 @@ class OpenDoor:
     def ready(self) -> bool:
         return True
 
-    async def submit(self, report: Report) -> Receipt:
-        return await self.intake.submit(report)
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        return await self.intake.submit_all(reports)
 
     async def order(self, command: str) -> str:
         return "HOLDING"

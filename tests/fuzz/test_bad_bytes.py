@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -170,7 +171,7 @@ def report() -> dict[str, Any]:
     return {
         "id": "x",
         "source": "fuzz",
-        "captured_at": 1.0,
+        "captured_at": time.time(),
         "usable": True,
         "pose": {"lat": lat, "lon": lon, "height_m": 30.0, "heading_deg": 0.0},
         "detections": [{"class": "person", "score": 0.5, "lat": lat2, "lon": lon2}],
@@ -215,7 +216,9 @@ def test_any_series_of_good_reports_leaves_a_probability(
         lat, lon = frame.to_latlon([[row, col]])[0].tolist()
         pose = {"lat": lat, "lon": lon, "height_m": 30.0, "heading_deg": 90.0}
         detections = [{"lat": lat, "lon": lon}] if hit else []
-        batch.append({"id": f"{salt}-{number}", "captured_at": 1.0, "pose": pose, "detections": detections})
+        batch.append(
+            {"id": f"{salt}-{number}", "captured_at": time.time(), "pose": pose, "detections": detections}
+        )
     assert fuzz_door(as_bytes(batch)).status_code in (200, 429)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -39,11 +39,11 @@ class FakeRun:
     def ready(self) -> bool:
         return True
 
-    async def submit(self, report: Report) -> Receipt:
-        self.reports.append(report)
-        return Receipt(id=report.id, status="accepted")
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        self.reports += reports
+        return [Receipt(id=report.id, status="accepted") for report in reports]
 
-    async def order(self, command: str) -> str:
+    async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
         self.orders.append(command)
         return "HOLDING"
 

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from service.commands.config import main
 from service.config import KNOWN_KEYS, Settings, read_settings
 from service.errors import BadInput
+from service.toml_lines import key_lines
 
 SHIPPED = Path(__file__).parents[2] / "config" / "service.toml"
 
@@ -36,11 +38,13 @@ def test_flags_win_over_environment_and_environment_over_file(tmp_path: Path) ->
     ("text", "words"),
     [
         ("[flight]\naltitud_m = 3\n", ["flight.altitud_m", "did you mean 'flight.altitude_m'"]),
+        ("[run]\n\n[flight]\np_tp = 0.5\n", ["wrong.toml:4:", "did you mean 'sensor.p_tp'"]),
+        ("altitude_m = 40\n", ["wrong.toml:1:", "did you mean 'flight.altitude_m'"]),
         ("[fligth]\n", ["fligth", "did you mean 'flight'"]),
         ("[sensor]\np_tp = 1.5\n", ["sensor.p_tp", "1.5", "less than 1"]),
         (
             "[sensor]\nprofile = 'fisheye'\n",
-            ["sensor.profile", "fisheye", "'point', 'donut' or 'wide-angle'"],
+            ["sensor.profile", "fisheye", "'wide-angle' or 'camera'"],
         ),
         ("[sensor\n", ["is not TOML", "line 1"]),
     ],
@@ -72,3 +76,51 @@ def test_only_a_simulator_may_run_faster_than_real_time() -> None:
     flags = {"link.connect": "serial:///dev/ttyACM0:921600", "link.speedup": 5.0}
     with pytest.raises(BadInput, match="real aircraft"):
         read_settings(None, environment={}, flags=flags)
+
+
+def test_the_line_of_a_key_is_found_whatever_the_spelling() -> None:
+    text = (
+        "# a comment\n[http]\nlisten = 'x'\nallowed_hosts = [\n  'a = 1',\n]\n"
+        'flight.speed_mps = 3\n\n[run]  # more\nfolder = """\nseed = 4\n"""\nseed = 5\n'
+    )
+    lines = key_lines(text)
+    assert lines["http.listen"] == 3
+    assert lines["http.allowed_hosts"] == 4
+    assert lines["http.flight.speed_mps"] == 7
+    assert (lines["run"], lines["run.folder"], lines["run.seed"]) == (9, 10, 13)
+    assert key_lines("inline = {a = 1}\n")["inline.a"] == 1
+
+
+def test_config_check_names_every_wrong_line_and_key(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text("[flight]\naltitud_m = 3\n\nspeed_mps = 900\n[http]\nallowed_hosts = [\n  1,\n]\n")
+    assert main(["check", str(file)]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert [line.partition(": ")[0] for line in said] == [f"{file}:{number}" for number in (2, 4, 6)]
+    assert "did you mean 'flight.altitude_m'" in said[0]
+    assert "'flight.speed_mps' = 900" in said[1]
+    assert "http.allowed_hosts" in said[2]
+
+
+def test_config_check_tells_where_each_setting_comes_from(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "good.toml"
+    file.write_text("[flight]\naltitude_m = 40\nspeed_mps = 5\n")
+    monkeypatch.setenv("ROISEARCH_FLIGHT_SPEED_MPS", "6")
+    monkeypatch.setenv("ROISEARCH_RUN_SEAD", "6")
+    assert main(["check", str(file)]) == 0
+    said = capsys.readouterr()
+    settings = dict(line.split(" = ") for line in said.out.splitlines()[1:])
+    assert settings["  flight.altitude_m"].split() == ["40.0", f"{file}:2"]
+    assert settings["  flight.speed_mps"].split() == [
+        "6.0",
+        *["environment", "variable"],
+        "ROISEARCH_FLIGHT_SPEED_MPS",
+    ]
+    assert "ROISEARCH_RUN_SEAD is no setting" in said.err
+    assert "did you mean ROISEARCH_RUN_SEED?" in said.err
+    assert main(["show"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == len(KNOWN_KEYS)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+from collections.abc import Collection
 
 import numpy as np
 import pytest
@@ -11,8 +13,10 @@ from hypothesis import strategies as st
 
 from roisearch import Belief, FieldOfView
 from service.area import GridFrame
-from service.evidence import Footprint, Observation, Passes, Pose, Sensor, grid_heading, observe
+from service.evidence import Footprint, Observation, Pose, Reading, Sensor, grid_heading, observe
+from service.passes import Passes
 
+CLOCK = itertools.count(100.0, 1.0 / 30.0)
 FRAME = GridFrame(47.05, 8.30, 0.0, 25.0, 20, 30, -375.0, 250.0)
 
 
@@ -33,16 +37,24 @@ def pose(row: float, col: float, height: float = 30.0, heading: float = 0.0) -> 
     return Pose(float(lat), float(lon), height, heading, 0.0)
 
 
+def look(
+    s: Sensor, passes: Passes, where: Pose, hits: Collection[tuple[int, int]] = ()
+) -> Observation | None:
+    """The next frame; a hit has the profile's likelihood ratio."""
+    reading = Reading(s.footprint(where), dict.fromkeys(hits, 0.9 / (1.0 - 0.8)))
+    return observe(passes, "camera", next(CLOCK), reading)
+
+
 def test_a_frame_over_a_cells_centre_is_a_look_at_it() -> None:
     footprint = sensor().footprint(pose(3, 4))
     assert footprint.cells.tolist() == [[3, 4]]
-    assert footprint.counts
-    assert footprint.covered == 1.0
+    assert footprint.counts.tolist() == [True]
+    assert footprint.covered.tolist() == [1.0]
 
 
 @pytest.mark.parametrize("where", [pose(3, 4.45), pose(3.4, 4.4), pose(3, 4, height=12.0), pose(-3, 4)])
 def test_a_frame_between_cells_or_too_low_or_off_the_grid_is_no_look(where: Pose) -> None:
-    assert not sensor().footprint(where).counts
+    assert not sensor().footprint(where).counts.any()
 
 
 def test_a_forward_field_of_view_turns_with_the_nose_and_with_the_grid() -> None:
@@ -58,7 +70,7 @@ def test_a_video_of_one_cell_clears_it_once() -> None:
     belief = Belief(np.ones(FRAME.shape))
     before = belief.probability()[3, 4]
     for _ in range(900):  # 30 seconds at 30 frames a second
-        observation = observe(s, passes, s.footprint(pose(3, 4)), set())
+        observation = look(s, passes, pose(3, 4))
         if observation is not None:
             belief.observe(observation.cells, observation.hits, observation.p_tp, observation.p_tn)
     odds = belief.probability()[3, 4] / before
@@ -69,17 +81,15 @@ def test_a_second_pass_is_a_second_look() -> None:
     s, passes = sensor(), Passes()
     looks = 0
     for where in (pose(3, 4), pose(3, 5), pose(3, 4)):
-        observation = observe(s, passes, s.footprint(where), set())
+        observation = look(s, passes, where)
         looks += 0 if observation is None else len(observation.cells)
     assert looks == 3
 
 
 def test_hovering_at_the_limit_of_a_look_is_one_pass() -> None:
     s, passes = sensor(), Passes()
-    looks = [
-        observe(s, passes, s.footprint(pose(3, 4 + wobble)), set()) for wobble in (0.2, 0.33, 0.2, 0.36, 0.2)
-    ]
-    assert not s.footprint(pose(3, 4.36)).counts
+    looks = [look(s, passes, pose(3, 4 + wobble)) for wobble in (0.2, 0.33, 0.2, 0.36, 0.2)]
+    assert not s.footprint(pose(3, 4.36)).counts.any()
     assert sum(look is not None for look in looks) == 1
 
 
@@ -87,8 +97,8 @@ def test_a_hit_later_in_the_pass_replaces_the_miss() -> None:
     s = sensor()
     late, at_once = Belief(np.ones(FRAME.shape)), Belief(np.ones(FRAME.shape))
     passes = Passes()
-    for hits in (set(), {(3, 4)}, set()):
-        o = observe(s, passes, s.footprint(pose(3, 4)), hits)
+    for hits in ((), ((3, 4),), ()):
+        o = look(s, passes, pose(3, 4), hits)
         if o is not None:
             late.observe(o.cells, o.hits, o.p_tp, o.p_tn)
     at_once.observe(np.array([[3, 4]]), np.array([True]), 0.9, 0.8)
@@ -97,15 +107,15 @@ def test_a_hit_later_in_the_pass_replaces_the_miss() -> None:
 
 def test_a_turned_verdict_is_not_another_look() -> None:
     s, passes = sensor(), Passes()
-    observe(s, passes, s.footprint(pose(3, 4)), set())
-    turned = observe(s, passes, s.footprint(pose(3, 4)), {(3, 4)})
+    look(s, passes, pose(3, 4))
+    turned = look(s, passes, pose(3, 4), {(3, 4)})
     assert turned is not None
     assert turned.first.tolist() == [False]
 
 
 def test_an_observation_survives_the_journal_to_the_last_bit() -> None:
     s, passes = sensor(FieldOfView.donut()), Passes()
-    observation = observe(s, passes, s.footprint(pose(3, 4)), {(2, 4)})
+    observation = look(s, passes, pose(3, 4), {(2, 4)})
     assert observation is not None
     again = Observation.from_dict(json.loads(json.dumps(observation.to_dict())))
     for name in ("cells", "hits", "p_tp", "p_tn", "first"):
@@ -114,11 +124,14 @@ def test_an_observation_survives_the_journal_to_the_last_bit() -> None:
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.booleans(), st.booleans()), max_size=60))
 def test_looks_are_at_most_one_per_visit(frames: list[tuple[int, bool, bool]]) -> None:
-    passes, s = Passes(), sensor()
+    passes = Passes()
     looks, visits, last = 0, 0, None
     for col, counts, hit in frames:
-        footprint = Footprint(np.array([[0, col]]), 1.0 if counts else 0.5, counts)
-        observation = observe(s, passes, footprint, {(0, col)} if hit else set())
+        covered = 1.0 if counts else 0.5
+        footprint = Footprint.alike(np.array([[0, col]]), covered=covered, counts=counts, p_tp=0.9, p_tn=0.8)
+        observation = observe(
+            passes, "camera", next(CLOCK), Reading(footprint, {(0, col): 4.5} if hit else {})
+        )
         looks += 0 if observation is None else int(observation.first.sum())
         visits += col != last
         last = col

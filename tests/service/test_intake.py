@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import sqlite3
+import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,9 +53,27 @@ def make(tmp_path: Path) -> Callable[..., Intake]:
     return intake
 
 
+@pytest.fixture
+def flying(make: Callable[..., Intake]) -> Callable[..., Intake]:
+    """An intake beside an aircraft that crosses a column of row 3 every second, and has been doing so for 20 s."""
+
+    def intake() -> Intake:
+        taker = make()
+        now = taker.clock.now()
+
+        def pose_at(moment: float) -> Pose | None:
+            return over(3, round(20 + moment - now)) if now - 20.4 < moment <= now + 0.5 else None
+
+        taker.pose_at = pose_at
+        taker.time_of_boot = lambda boot_s: now - 20.0 + boot_s if boot_s >= 0 else None
+        return taker
+
+    return intake
+
+
 def frame(name: str, *, hit: bool = False, usable: bool = True) -> Report:
     detections = (Detection(lat=HERE.lat, lon=HERE.lon),) if hit else ()
-    return Report(id=name, captured_at=100.0, usable=usable, detections=detections)
+    return Report(id=name, captured_at=time.time(), usable=usable, detections=detections)
 
 
 def test_a_report_is_on_disk_when_it_is_acknowledged(make: Callable[..., Intake]) -> None:
@@ -92,7 +112,7 @@ def test_a_report_that_could_not_be_written_may_be_sent_again(make: Callable[...
 def test_a_frame_of_an_unknown_time_is_refused_with_the_reason(make: Callable[..., Intake]) -> None:
     receipt = asyncio.run(make(None).submit(frame("a")))
     assert receipt.status == "refused"
-    assert "captured_at 100.000" in receipt.reason
+    assert "no position of the aircraft is known and trusted for captured_at" in receipt.reason
 
 
 def test_an_unusable_frame_is_no_evidence(make: Callable[..., Intake]) -> None:
@@ -100,3 +120,124 @@ def test_an_unusable_frame_is_no_evidence(make: Callable[..., Intake]) -> None:
     before = intake.search.belief.digest()
     assert asyncio.run(intake.submit(frame("a", usable=False))).looks == 0
     assert intake.search.belief.digest() == before
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"detections": [{"box": [1, 2, 3, 4]}]}, "cannot place a pixel box"),
+        ({"gimbal": {"pitch_deg": -30}}, "no use for a gimbal"),
+        ({"footprint": [[47.0, 8.0], [47.0, 8.1], [47.1, 8.0]]}, "no use for a footprint"),
+        ({"clock": "boot"}, "since boot"),
+    ],
+)
+def test_what_cannot_be_interpreted_is_refused_with_the_reason_and_not_ignored(
+    make: Callable[..., Intake], more: dict[str, Any], words: str
+) -> None:
+    intake = make()
+    before = intake.search.belief.digest()
+    report = Report.model_validate({"id": "a", "captured_at": time.time(), **more})
+    receipt = asyncio.run(intake.submit(report))
+    assert receipt.status == "refused"
+    assert words in receipt.reason
+    assert intake.search.belief.digest() == before
+    assert list(read_rows(intake.journal.path, "report")) == []
+
+
+# ---- when it was captured
+
+
+def ago(intake: Intake, name: str, seconds: float, **more: Any) -> Report:
+    return Report(id=name, captured_at=intake.clock.now() - seconds, **more)
+
+
+def test_a_late_report_is_applied_to_the_pose_it_was_captured_at(flying: Callable[..., Intake]) -> None:
+    intake = flying()
+    for name, seconds in (("now", 0.0), ("late", 8.0), ("later", 15.0)):
+        assert asyncio.run(intake.submit(ago(intake, name, seconds))).looks == 1
+    cells = [row.body["observation"]["cells"] for row in read_rows(intake.journal.path, "report")]
+    assert cells == [[[3, 20]], [[3, 12]], [[3, 5]]]
+
+
+def test_time_since_boot_is_translated(flying: Callable[..., Intake]) -> None:
+    intake = flying()
+    receipts = asyncio.run(
+        intake.submit_all([Report(id=f"{s}", captured_at=s, clock="boot") for s in (7.0, -1.0)])
+    )
+    assert [receipt.status for receipt in receipts] == ["accepted", "refused"]
+    assert "-1.000 s since boot" in receipts[1].reason
+    (row,) = read_rows(intake.journal.path, "report")
+    assert row.body["observation"]["cells"] == [[3, 7]]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(500.0, "500.0 s ago, and the telemetry is kept for 120 s"), (-30.0, "30.0 s in the future")],
+)
+@pytest.mark.parametrize("pose", [None, {"lat": 47.05, "lon": 8.3, "height_m": 30.0, "heading_deg": 0.0}])
+def test_a_report_of_another_time_is_refused_with_the_reason(
+    flying: Callable[..., Intake], seconds: float, words: str, pose: Any
+) -> None:
+    intake = flying()
+    receipt = asyncio.run(intake.submit(ago(intake, "a", seconds, pose=pose)))
+    assert receipt.status == "refused"
+    assert words in receipt.reason
+    assert intake.refused == 1
+
+
+def test_what_waits_together_is_taken_in_in_the_order_of_capture(flying: Callable[..., Intake]) -> None:
+    intake = flying()
+    reports = [ago(intake, f"{seconds}", seconds) for seconds in (3.0, 9.0, 1.0, 6.0)]
+    receipts = asyncio.run(intake.submit_all(reports))
+    assert [receipt.id for receipt in receipts] == ["3.0", "9.0", "1.0", "6.0"]
+    written = [row.body["report"]["id"] for row in read_rows(intake.journal.path, "report")]
+    assert written == ["9.0", "6.0", "3.0", "1.0"]
+
+
+def test_a_large_batch_is_written_whole_and_a_report_beside_it_does_not_wait_for_its_end(
+    flying: Callable[..., Intake],
+) -> None:
+    intake = flying()
+    order: list[str] = []
+
+    async def send(name: str, reports: list[Report]) -> None:
+        await intake.submit_all(reports)
+        order.append(name)
+
+    async def both() -> None:
+        many = [ago(intake, f"{number}", 3.0 - number / 500) for number in range(500)]
+        async with asyncio.TaskGroup() as group:
+            group.create_task(send("batch", many))
+            await asyncio.sleep(0)
+            group.create_task(send("one", [ago(intake, "one", 4.0)]))
+
+    asyncio.run(both())
+    assert order == ["one", "batch"]
+    assert len(list(read_rows(intake.journal.path, "report"))) == 501
+    assert intake.accepted == 501
+
+
+def test_a_flood_is_refused_in_words_and_not_kept(
+    flying: Callable[..., Intake], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.intake.MOST_WAITING", 10)
+    intake = flying()
+
+    async def flood() -> list[str]:
+        batches = await asyncio.gather(
+            *(intake.submit_all([ago(intake, f"{b}-{i}", 1.0) for i in range(10)]) for b in range(3))
+        )
+        return [receipt.status for batch in batches for receipt in batch]
+
+    assert asyncio.run(flood()) == ["accepted"] * 10 + ["refused"] * 20
+
+
+def test_who_sent_what_broke_the_intake_hears_of_it_and_the_next_report_is_taken_in(
+    flying: Callable[..., Intake],
+) -> None:
+    intake = flying()
+    told, intake.told = intake.told, lambda *_: 1 / 0  # type: ignore[assignment]
+    with pytest.raises(ZeroDivisionError):
+        asyncio.run(intake.submit(ago(intake, "a", 1.0)))
+    intake.told = told
+    assert asyncio.run(intake.submit(ago(intake, "b", 2.0))).status == "accepted"

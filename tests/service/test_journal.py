@@ -46,6 +46,21 @@ def test_rows_come_back_in_order_with_every_bit_of_their_numbers(tmp_path: Path)
     assert [row.kind for row in read_rows(tmp_path / "j.sqlite", "start")] == ["start"]
 
 
+def test_who_stops_waiting_neither_loses_the_row_nor_the_journal(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "j.sqlite")
+
+    async def write() -> None:
+        for n in range(50):
+            waiting = asyncio.create_task(journal.append(0.0, "given up", {"n": n}))
+            await asyncio.sleep(0)
+            waiting.cancel()
+        await asyncio.wait_for(journal.append(1.0, "after", {}), timeout=60)
+
+    asyncio.run(write())
+    journal.close()
+    assert [row.kind for row in read_rows(tmp_path / "j.sqlite")] == ["given up"] * 50 + ["after"]
+
+
 def test_a_key_is_taken_once_even_among_many_written_together(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "j.sqlite")
 

@@ -75,3 +75,16 @@ def test_a_pose_lies_between_its_neighbours(time: float, step: float, yaw: float
     assert pose.lat == pytest.approx(47.0 + step * time, abs=1e-9)
     assert 0.0 <= pose.heading_deg <= 360.0
     assert abs((pose.heading_deg - yaw - 10 * time + 180.0) % 360.0 - 180.0) < 1e-6
+
+
+def test_time_since_boot_is_found_between_the_samples_it_was_received_with() -> None:
+    past = history(
+        replace(BASE, position_time=100.0, boot_time_s=7.0),
+        replace(BASE, position_time=101.0, boot_time_s=8.0),
+    )
+    assert past.time_of_boot(7.25) == pytest.approx(100.25)
+    assert past.time_of_boot(8.4) == pytest.approx(101.4)
+    assert past.time_of_boot(7.0) == 100.0
+    for unknown in (6.9, 8.6, float("nan"), float("inf")):
+        assert past.time_of_boot(unknown) is None
+    assert history(replace(BASE, position_time=100.0)).time_of_boot(7.0) is None

@@ -11,10 +11,12 @@ from sim.detector import Detector, contains, main
 SQUARE = [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
 
 
-def state(row: int, counts: bool = True) -> dict[str, Any]:
+def state(row: int, counts: bool = True, p_tp: float = 0.9) -> dict[str, Any]:
     corners = [[lat - row, lon] for lat, lon in SQUARE]
-    cell = {"row": row, "col": 0, "lat": 0.5 - row, "lon": 0.5, "corners": corners}
-    return {"pose": {"time": float(row)}, "footprint": {"counts": counts, "covered": 1.0, "cells": [cell]}}
+    worth = {"counts": counts, "covered": 1.0, "p_tp": p_tp, "p_tn": 0.9}
+    cell = {"row": row, "col": 0, "lat": 0.5 - row, "lon": 0.5, "corners": corners, **worth}
+    nominal = {"counts": counts, "covered": 1.0, "p_tp": 0.9, "p_tn": 0.9}
+    return {"pose": {"time": float(row)}, "footprint": {**nominal, "cells": [cell]}}
 
 
 def rate(target: tuple[float, float] | None, p_tp: float, p_tn: float) -> float:
@@ -42,6 +44,18 @@ def test_frames_of_one_pass_repeat_its_verdict() -> None:
         verdicts = {bool(detector.frame(state(0))["detections"]) for _ in range(10)}
         assert len(verdicts) == 1
         detector.frame(state(1))
+
+
+def test_a_better_view_in_the_same_pass_finds_as_many_as_it_would_alone() -> None:
+    detector = Detector((0.4, 0.4), 0.9, 0.9, seed=2)
+    poor = better = 0
+    for _ in range(2000):
+        poor += bool(detector.frame(state(0, p_tp=0.45))["detections"])
+        better += bool(detector.frame(state(0))["detections"])
+        assert bool(detector.frame(state(0, p_tp=0.45))["detections"]) == bool(detector._hits)
+        detector.frame(state(1))
+    assert poor / 2000 == pytest.approx(0.45, abs=0.04)
+    assert better / 2000 == pytest.approx(0.9, abs=0.03)
 
 
 def test_a_frame_between_cells_reports_that_nothing_was_seen() -> None:

@@ -1,0 +1,110 @@
+"""Where on the ground a pixel lies, how sure that is, and which cells it may be in.
+
+The uncertainty is of first order: the errors of pixel, attitude, position and height, taken as independent, through
+the projection's derivatives. They are differences over one standard deviation, so a ground that bends within it is
+told as the straight line through both ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri
+
+from service.camera.ground import Ground
+from service.camera.optics import Floats, Sight, rotation
+
+Cell = tuple[int, int]
+_POINTS = 233  # of a Fibonacci lattice, which fills the square evenly in both directions at once
+_LATTICE = np.stack([np.arange(_POINTS), np.arange(_POINTS) * 144 % _POINTS], axis=1)
+_CLOUD = ndtri((_LATTICE + 0.5) / _POINTS)
+_CLOUD /= _CLOUD.std(axis=0)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Standard deviations: of the camera's direction about each axis, of its place in each direction and of its
+    height above the ground."""
+
+    attitude_deg: float
+    position_m: float
+    height_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A place on the ground: (east, south) in metres, and its covariance [2, 2] in square metres."""
+
+    point: Floats
+    covariance: Floats
+
+
+def locate_pixel(
+    sight: Sight, pixel: ArrayLike, pixel_sigma: ArrayLike, ground: Ground, errors: Errors, max_range_m: float
+) -> Spot | None:
+    """Where the ray through `pixel` (x, y) meets the ground; `pixel_sigma` in pixels (x, y).
+
+    None when it does not within `max_range_m`, or when an error of one standard deviation would lift it over the
+    horizon or beyond that range: such a pixel says nothing about where its object is.
+    """
+    x, y = np.asarray(pixel, dtype=np.float64)
+    sigma_x, sigma_y = np.asarray(pixel_sigma, dtype=np.float64)
+    turn = np.radians(errors.attitude_deg)
+    moves: list[tuple[Sight, float, float]] = [(sight, x, y)]
+    for sign in (1.0, -1.0):
+        moves += [(sight, x + sign * sigma_x, y), (sight, x, y + sign * sigma_y)]
+        moves += [(_turned(sight, sign * turn, axis), x, y) for axis in range(3)]
+        moves += [(_raised(sight, sign * errors.height_m), x, y)]
+    rays = np.concatenate([moved.rays([[px, py]]) for moved, px, py in moves])
+    reach = 2.0 * max_range_m
+    points = []
+    for (moved, _, _), ray in zip(moves, rays, strict=True):
+        far = float(ground.meet(moved.position, ray[None], reach)[0])
+        if not np.isfinite(far):
+            return None
+        points.append(moved.position[:2] + far * ray[:2])
+    if np.linalg.norm(points[0] - sight.position[:2]) > max_range_m:
+        return None
+    half = (len(points) - 1) // 2
+    columns = 0.5 * (np.array(points[1 : 1 + half]) - np.array(points[1 + half :]))
+    covariance = columns.T @ columns + np.eye(2) * errors.position_m**2
+    return Spot(points[0], covariance)
+
+
+def _turned(sight: Sight, angle: float, axis: int) -> Sight:
+    """The camera turned by a small angle (radians) about one of its own axes (forward, right, down)."""
+    angles = np.zeros(3)
+    angles[axis] = np.degrees(angle)
+    roll, pitch, yaw = angles
+    return Sight(sight.camera, sight.position, rotation(yaw, pitch, roll).T @ sight.axes)
+
+
+def _raised(sight: Sight, metres: float) -> Sight:
+    return Sight(sight.camera, sight.position + np.array([0.0, 0.0, metres]), sight.axes)
+
+
+def spread(spot: Spot, cell_m: float) -> dict[Cell, float]:
+    """The probability of each cell that `spot` may lie in: the share of 233 equally probable points of its Gaussian,
+    so each is right to about one in a hundred."""
+    values, vectors = np.linalg.eigh(spot.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    cells = np.floor((spot.point + _CLOUD @ root.T) / cell_m).astype(np.int64)
+    found, counts = np.unique(cells[:, ::-1], axis=0, return_counts=True)
+    return {(int(r), int(c)): float(n) / len(_CLOUD) for (r, c), n in zip(found, counts, strict=True)}
+
+
+def shares(
+    chances: dict[Cell, float], cells: NDArray[np.int64], p_tn: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """For each of the frame's cells [k, 2] the probability that a detection is a hit of that cell: float [k], and how
+    much of the detection lies in them at all.
+
+    Where a detection comes from is weighed by how likely a hit is at all: with Q = (1 - p_tn) / p_tn, the odds of a
+    false alarm, the share of cell c is w_c Q_c / sum(w Q).
+    """
+    w = np.array([chances.get((row, col), 0.0) for row, col in cells.tolist()])
+    weighed = w * (1.0 - p_tn) / p_tn
+    total = float(weighed.sum())
+    return (weighed / total if total > 0.0 else weighed), float(w.sum())

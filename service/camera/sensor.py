@@ -1,0 +1,232 @@
+"""The sensor profile "camera": detector reports become evidence through the camera's geometry.
+
+What a report tells about its camera (gimbal, intrinsics, the footprint's outline) goes before the settings. A
+detection with a pixel box is projected onto the ground with its uncertainty; one with latitude and longitude has its
+own `accuracy_m`, else what the camera's errors make of that place.
+
+The model of a hit that may lie in several cells: in each cell in view the detector has a hit or has none, as always
+(p_tp, p_tn); which cell a detection is the hit of is known only with the share s_c. Summing over the cells gives
+Bayes' rule for cell c exactly: its odds are multiplied by
+
+    s_c * p_tp / (1 - p_tn)  +  (1 - s_c) * (1 - p_tp) / p_tn
+
+the mean of a hit and a miss. Several detections that share no cell are exact too; of those that do, one at least is a
+hit of the cell with 1 - prod(1 - s_c).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from roisearch import FieldOfView
+from service.area.frame import GridFrame
+from service.camera.detect import Detectability
+from service.camera.ground import Flat, Ground
+from service.camera.locate import Errors, Spot, locate_pixel, shares, spread
+from service.camera.look import Looks, look_at_cells
+from service.camera.optics import Pinhole, Sight, rotation, sight_from
+from service.evidence import Cell, Footprint, Pose, Reading, Sighting, Unreadable
+from service.reports import Detection, Gimbal, Intrinsics, Report
+
+_LEAST_ON_FOOTPRINT = 0.05  # a detection with less of its probability in the cells looked at lies beside them
+
+
+@dataclass(frozen=True)
+class Mount:
+    """How the camera sits: angles to the nose. Stabilised: a gimbal holds pitch and roll to the horizon and only the
+    heading turns it; else the aircraft's attitude turns it too."""
+
+    pitch_deg: float
+    yaw_deg: float = 0.0
+    roll_deg: float = 0.0
+    stabilised: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class CameraSensor:
+    """The sensor's profile on this grid: which cells a pose shows, and what a report says about them."""
+
+    frame: GridFrame
+    ground: Ground
+    camera: Pinhole
+    mount: Mount
+    detect: Detectability
+    p_tn: float
+    min_covered: float
+    max_range_m: float
+    min_grazing_deg: float
+    errors: Errors
+
+    # ---- the two questions of every profile --------------------------------------------------------------
+
+    def footprint(self, pose: Pose) -> Footprint:
+        """The cells that a frame taken from `pose` shows, as the settings have the camera."""
+        return self._footprint(self.sight(pose))
+
+    def read(self, pose: Pose, report: Report) -> Reading:
+        """The evidence in a report of a frame taken from `pose`.
+
+        Raises:
+            Unreadable: the report says what no camera of this kind can see.
+        """
+        sight = self.sight(pose, report.gimbal, report.intrinsics)
+        outline = report.footprint
+        footprint = self._footprint(sight) if outline is None else self._outlined(outline)
+        spots = [(spot, seen) for seen in report.detections if (spot := self._spot(sight, seen)) is not None]
+        hits, on_it = self._hits(footprint, [spot for spot, _ in spots])
+        found = [self._sighting(*spots[i]) for i in on_it]
+        return Reading(footprint, hits, tuple(found))
+
+    def sight(self, pose: Pose, gimbal: Gimbal | None = None, intrinsics: Intrinsics | None = None) -> Sight:
+        """The camera at a pose, turned as the report's gimbal says, else as it is mounted."""
+        east, south = self.frame.to_metres([[pose.lat, pose.lon]])[0]
+        level = self.mount.stabilised if gimbal is None else False
+        body = rotation(pose.heading_deg, *((0.0, 0.0) if level else _attitude(pose)))
+        if gimbal is None:
+            turn = body @ rotation(self.mount.yaw_deg, self.mount.pitch_deg, self.mount.roll_deg)
+        else:
+            own = rotation(gimbal.yaw_deg, gimbal.pitch_deg, gimbal.roll_deg)
+            turn = own if gimbal.relative_to == "earth" else body @ own
+        on_grid = rotation(-self.frame.bearing_deg, 0.0, 0.0) @ turn
+        return sight_from(_pinhole(intrinsics) or self.camera, (east, south, pose.height_m), on_grid)
+
+    # ---- cells -------------------------------------------------------------------------------------------
+
+    def _footprint(self, sight: Sight) -> Footprint:
+        looks = look_at_cells(
+            sight,
+            self.ground,
+            self.frame,
+            self.detect,
+            max_range_m=self.max_range_m,
+            min_grazing_deg=self.min_grazing_deg,
+        )
+        return self._worth(looks)
+
+    def _worth(self, looks: Looks) -> Footprint:
+        """A false alarm comes from the part of a cell that is in view, so 1 - p_tn is as much less."""
+        counts = (looks.covered >= self.min_covered) & (looks.p_tp >= self.detect.floor)
+        p_tn = 1.0 - looks.covered * (1.0 - self.p_tn)
+        kept = looks.covered >= 0.5 * self.min_covered
+        return Footprint(looks.cells[kept], looks.covered[kept], counts[kept], looks.p_tp[kept], p_tn[kept])
+
+    def _outlined(self, outline: tuple[tuple[float, float], ...]) -> Footprint:
+        """The cells of a polygon that the sender drew, each worth the nominal p_tp times its part inside."""
+        shape = shapely.Polygon([(lon, lat) for lat, lon in outline])
+        if not shape.is_valid or shape.area == 0.0:
+            raise Unreadable(
+                "the footprint is not a polygon: its sides cross, or its corners lie in one line"
+            )
+        flat = self.frame.flatten(shape)
+        west, north, east, south = np.array(flat.bounds) / self.frame.cell_m
+        top, bottom = max(0, math.floor(north)), min(self.frame.rows, math.floor(south) + 1)
+        left, right = max(0, math.floor(west)), min(self.frame.cols, math.floor(east) + 1)
+        rows, cols = np.mgrid[top : max(top, bottom), left : max(left, right)]
+        cells = np.stack([rows.ravel(), cols.ravel()], axis=1).astype(np.int64)
+        corner = cells[:, ::-1] * self.frame.cell_m
+        squares = shapely.box(
+            corner[:, 0], corner[:, 1], corner[:, 0] + self.frame.cell_m, corner[:, 1] + self.frame.cell_m
+        )
+        covered = shapely.area(shapely.intersection(squares, flat)) / self.frame.cell_m**2
+        return self._worth(Looks(cells, covered, covered * self.detect.p_tp))
+
+    # ---- detections --------------------------------------------------------------------------------------
+
+    def _spot(self, sight: Sight, seen: Detection) -> Spot | None:
+        """Where a detection is on the ground; None where that cannot be told."""
+        if seen.box is not None:
+            x0, y0, x1, y1 = seen.box
+            sigma = np.maximum(np.array([x1 - x0, y1 - y0]) / 4.0, 1.0)
+            middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
+            return locate_pixel(sight, middle, sigma, self.ground, self.errors, self.max_range_m)
+        point = self.frame.to_metres(np.array([[seen.lat, seen.lon]], dtype=np.float64))[0]
+        if seen.accuracy_m is not None:
+            return Spot(point, np.eye(2) * seen.accuracy_m**2)
+        there = np.array([[*point, float(self.ground.height_at(point[None])[0])]])
+        pixels, depth = sight.project(there)
+        located = None
+        if depth[0] > 0.0:
+            located = locate_pixel(sight, pixels[0], (1.0, 1.0), self.ground, self.errors, self.max_range_m)
+        return Spot(point, located.covariance if located else np.eye(2) * self.frame.cell_m**2)
+
+    def _sighting(self, spot: Spot, seen: Detection) -> Sighting:
+        lat, lon = self.frame.from_metres(spot.point[None])[0]
+        c = spot.covariance
+        square = (float(c[0, 0]), float(c[0, 1]), float(c[1, 1]))
+        return Sighting(float(lat), float(lon), square, seen.thumbnail)
+
+    def _hits(self, footprint: Footprint, spots: list[Spot]) -> tuple[dict[Cell, float], list[int]]:
+        """The likelihood ratio of every cell that a detection may be a hit of, and which spots lie in these."""
+        looked = footprint.counts
+        cells, p_tp, p_tn = footprint.cells[looked], footprint.p_tp[looked], footprint.p_tn[looked]
+        none = np.ones(len(cells))
+        on_it = []
+        for number, spot in enumerate(spots):
+            share, on_footprint = shares(spread(spot, self.frame.cell_m), cells, p_tn)
+            if on_footprint >= _LEAST_ON_FOOTPRINT:
+                none *= 1.0 - share
+                on_it.append(number)
+        share = 1.0 - none
+        ratio = share * p_tp / (1.0 - p_tn) + (1.0 - share) * (1.0 - p_tp) / p_tn
+        hits = {(r, c): float(ratio[i]) for i, (r, c) in enumerate(cells.tolist()) if share[i] > 0.0}
+        return hits, on_it
+
+
+def _attitude(pose: Pose) -> tuple[float, float]:
+    """Pitch and roll; level where the telemetry has not told them."""
+    known = math.isfinite(pose.pitch_deg) and math.isfinite(pose.roll_deg)
+    return (pose.pitch_deg, pose.roll_deg) if known else (0.0, 0.0)
+
+
+def _pinhole(given: Intrinsics | None) -> Pinhole | None:
+    if given is None:
+        return None
+    if given.horizontal_fov_deg is not None:
+        camera = Pinhole.of_angles(given.width, given.height, given.horizontal_fov_deg)
+    else:
+        assert given.fx is not None
+        assert given.fy is not None
+        camera = Pinhole(given.width, given.height, given.fx, given.fy, given.width / 2, given.height / 2)
+    cx = camera.cx if given.cx is None else given.cx
+    cy = camera.cy if given.cy is None else given.cy
+    return replace(camera, cx=cx, cy=cy)
+
+
+def nominal_view(sensor: CameraSensor, height_m: float, cell_m: float) -> FieldOfView:
+    """The field of view that the planner plans with: level, at the height of the search, over flat ground.
+
+    Evidence is one look per cell and pass, so of the rows that a straight flight shows one after another, each column
+    keeps only its best: planning with all of them would count the same pass as many looks.
+
+    Raises:
+        ValueError: no cell of that size is in view well enough to count.
+    """
+    frame = GridFrame(0.0, 0.0, 0.0, cell_m, 1, 1, -0.5 * cell_m, 0.5 * cell_m)
+    middle = Pose(0.0, 0.0, height_m, 0.0, 0.0)
+    there = replace(sensor, frame=frame, ground=Flat())
+    looks = look_at_cells(
+        there.sight(middle), there.ground, frame, sensor.detect,
+        max_range_m=sensor.max_range_m, min_grazing_deg=sensor.min_grazing_deg, bounded=False,
+    )  # fmt: skip
+    counts = (looks.covered >= sensor.min_covered) & (looks.p_tp >= sensor.detect.floor)
+    if not counts.any():
+        raise ValueError(f"no cell of {cell_m:g} m is in view from {height_m:g} m well enough to count")
+    best: dict[int, int] = {}
+    for i in np.flatnonzero(counts):
+        col = int(looks.cells[i, 1])
+        if col not in best or looks.p_tp[i] > looks.p_tp[best[col]]:
+            best[col] = int(i)
+    chosen: NDArray[np.int64] = np.array(sorted(best.values()), dtype=np.int64)
+    reach = int(np.abs(looks.cells[chosen]).max())
+    mask = np.zeros((2 * reach + 1, 2 * reach + 1), dtype=np.bool_)
+    p_tp, p_tn = np.full(mask.shape, sensor.detect.p_tp), np.full(mask.shape, sensor.p_tn)
+    rows, cols = (looks.cells[chosen] + reach).T
+    mask[rows, cols] = True
+    p_tp[rows, cols] = looks.p_tp[chosen]
+    p_tn[rows, cols] = 1.0 - looks.covered[chosen] * (1.0 - sensor.p_tn)
+    return FieldOfView.from_mask(mask, p_tp, p_tn)

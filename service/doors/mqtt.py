@@ -1,0 +1,117 @@
+"""MQTT: reports as messages on a topic, receipts on the topic below it, `<topic>/receipts`.
+
+A message holds one or more lines. The broker decides who may publish; the service gives it the name and password of
+`doors.mqtt_credentials_file`. A message counts when its receipt is out: a sender that gets none sends it again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import logging
+import ssl
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+from service.doors.lines import SubmitAll, answer
+from service.errors import BadInput
+from service.secret_file import read_secret
+
+if TYPE_CHECKING:
+    from aiomqtt import Client
+
+log = logging.getLogger("roisearch")
+PORTS = {"mqtt": 1883, "mqtts": 8883}
+RETRY_S = 2.0
+_QOS = 1
+
+
+@dataclass(frozen=True)
+class Broker:
+    """Where the broker is, and who we are to it."""
+
+    url: str
+    host: str
+    port: int
+    tls: bool
+    topic: str
+    user: str | None = None
+    password: str | None = field(default=None, repr=False)
+
+
+def read_broker(url: str, topic: str, credentials_file: str) -> Broker:
+    """The broker of the settings. Raises BadInput when the URL, the topic or the credentials are none, or the client
+    library is missing."""
+    if importlib.util.find_spec("aiomqtt") is None:
+        raise BadInput("doors.mqtt needs the extra 'mqtt': pip install 'roisearch[mqtt]'")
+    try:
+        parts = urlsplit(url)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host, port = None, None
+    if not host or parts.scheme not in PORTS or parts.path.strip("/") or parts.username is not None:
+        raise BadInput(
+            f"doors.mqtt = '{url}' is not a broker; give mqtt://HOST:PORT, or mqtts:// for TLS, and credentials in "
+            "doors.mqtt_credentials_file"
+        )
+    if not topic or any(sign in topic for sign in "+#\0"):
+        raise BadInput(f"doors.mqtt_topic = '{topic}' is not a topic; wildcards are not allowed")
+    user = password = None
+    if credentials_file:
+        text = read_secret(credentials_file, "name and password of the MQTT broker").decode(
+            "utf-8", "replace"
+        )
+        user, colon, password = text.strip().partition(":")
+        if not colon:
+            raise BadInput(f"{credentials_file}: the credentials are one line, NAME:PASSWORD")
+    tls = parts.scheme == "mqtts"
+    return Broker(url, host, port or PORTS[parts.scheme], tls, topic, user, password)
+
+
+async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
+    """Take in what is published, until cancelled; a broker that is away is called again and again."""
+    import aiomqtt
+
+    told = ""
+    while True:
+        try:
+            async with aiomqtt.Client(
+                broker.host,
+                broker.port,
+                username=broker.user,
+                password=broker.password,
+                tls_context=ssl.create_default_context() if broker.tls else None,
+            ) as client:
+                await client.subscribe(broker.topic, qos=_QOS)
+                log.info("reports are taken from %s at %s", broker.topic, broker.url)
+                told = ""
+                await _listen(client, broker, submit)
+        except* (aiomqtt.MqttError, OSError) as group:
+            reason = str(group.exceptions[0])
+            if reason != told:
+                log.warning("the MQTT broker %s cannot be reached (%s): trying again", broker.url, reason)
+            told = reason
+        await asyncio.sleep(RETRY_S)
+
+
+async def _listen(client: Client, broker: Broker, submit: SubmitAll) -> None:
+    """Answer messages until the connection ends: all that have come while the last were answered, at once."""
+    gathered: list[bytes] = []
+    more = asyncio.Event()
+
+    async def reply() -> None:
+        while True:
+            await more.wait()
+            more.clear()
+            data = b"\n".join(gathered)
+            gathered.clear()
+            if receipts := await answer(data, submit):
+                await client.publish(f"{broker.topic}/receipts", receipts, qos=_QOS)
+
+    async with asyncio.TaskGroup() as group:
+        group.create_task(reply())
+        async for message in client.messages:
+            payload = message.payload
+            gathered.append(payload if isinstance(payload, bytes) else str(payload).encode())
+            more.set()

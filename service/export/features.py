@@ -1,0 +1,121 @@
+"""What of a run has a place, as a flat list: the one thing that GeoJSON, KML and GPX are all made from."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import shapely
+
+from service.area.prior import cell_squares
+from service.export.gaps import find_gaps, on_earth, oriented
+from service.export.run import Fix, Run
+from service.export.wishes import Wishes
+
+_CORNERS = 48
+
+
+@dataclass(frozen=True)
+class Item:
+    """A thing with a place.
+
+    Attributes:
+        role: search, exclude, launch, region, gap, track, hit, detection, uncertainty or found.
+        name: for a person, a few words.
+        shape: shapely, x = longitude, y = latitude in degrees; None for a track.
+        fixes: of a track.
+        time: of something that happened, seconds since the epoch.
+        facts: more, by name.
+    """
+
+    role: str
+    name: str
+    shape: shapely.Geometry | None = None
+    fixes: Sequence[Fix] = ()
+    time: float | None = None
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+def items(run: Run, wishes: Wishes) -> list[Item]:
+    """Everything, from the ground up: what is listed later is drawn on top."""
+    return [
+        *_ground(run),
+        *_regions(run),
+        *_gaps(run, wishes),
+        *(Item("track", f"track {number}", fixes=piece) for number, piece in enumerate(run.track, 1)),
+        *(Item("hit", f"hit {number}", _point(*at)) for number, at in enumerate(run.hits, 1)),
+        *_detections(run),
+        *_found(run),
+    ]
+
+
+def iso(time: float) -> str:
+    """A time in seconds since the epoch as ISO 8601 in UTC, to the millisecond."""
+    moment = datetime.datetime.fromtimestamp(time, datetime.UTC)
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _point(lat: float, lon: float) -> shapely.Point:
+    return shapely.Point(lon, lat)
+
+
+def _ground(run: Run) -> Iterable[Item]:
+    area = run.area
+    yield Item("search", area.name, oriented(area.polygon))
+    for number, exclusion in enumerate(area.exclusions, 1):
+        facts = {"searchable": exclusion.searchable}
+        yield Item("exclude", f"exclusion {number}", oriented(exclusion.polygon), facts=facts)
+    yield Item("launch", "launch", _point(*run.grid.launch))
+
+
+def _regions(run: Run) -> Iterable[Item]:
+    squares, poa = cell_squares(run.frame), run.poa
+    for number in range(1, int(run.labels.max(initial=0)) + 1):
+        inside = run.labels == number
+        if inside.any():
+            facts = {"poa": float(poa[inside].sum()), "pod": float(run.pod[inside].mean())}
+            shape = on_earth(run.frame, shapely.union_all(squares[inside]))
+            yield Item("region", f"ROI {number}", shape, facts=facts)
+
+
+def _gaps(run: Run, wishes: Wishes) -> Iterable[Item]:
+    for number, gap in enumerate(find_gaps(run, wishes), 1):
+        facts = {
+            "poa": gap.poa,
+            "pod": gap.pod,
+            "area_m2": round(gap.area_m2, 1),
+            "cells": gap.cells,
+            "flyable": gap.flyable,
+        }
+        yield Item("gap", f"gap {number}", gap.polygon, facts=facts)
+
+
+def _detections(run: Run) -> Iterable[Item]:
+    for number, each in enumerate(run.detections, 1):
+        facts = {
+            "class": each.kind,
+            "score": each.score,
+            "source": each.source,
+            "counted": each.counted,
+        }
+        yield Item(
+            "detection", f"detection {number}", _point(each.lat, each.lon), time=each.time, facts=facts
+        )
+
+
+def _found(run: Run) -> Iterable[Item]:
+    """The find, and the ellipse that holds the target with 95 % if it is there: a circle of its longest sigma."""
+    find = run.find
+    if find is None:
+        return
+    facts = {"probability": find.probability, "sigma_m": find.sigma_m}
+    middle = run.frame.to_metres([(find.lat, find.lon)])[0]
+    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
+    radius = find.sigma_m * float(np.sqrt(-2.0 * np.log(0.05)))
+    circle = shapely.Polygon(middle + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    said = {"holds": 0.95, "radius_m": round(radius, 1)}
+    yield Item("uncertainty", "where the target is with 95 %", on_earth(run.frame, circle), facts=said)
+    yield Item("found", "found", _point(find.lat, find.lon), time=find.time, facts=facts)

@@ -1,0 +1,190 @@
+"""What a search of an area will be like, worked out before anybody flies.
+
+The real planner is flown over the prior without a target: once with a detector that raises no alarm, for the path,
+and a few times with as many false alarms as its p_tn says, for the times. How long that takes in the air is in `pace`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from roisearch import Regions
+from service.area import Grid, SearchArea, way_home
+from service.config import Settings
+from service.flight import LatLon
+from service.foresight import Foresight, foresee
+from service.pace import climb_seconds, leg_seconds
+from service.search import Search
+
+GOALS = (0.5, 0.75, 0.95)
+DRAWS = 3
+MOST_STEPS = 2500
+ENOUGH = 0.98
+"""The simulation ends with so much of what can be reached: the rest takes longer than all before, and no battery."""
+
+FIRST_S = 300.0
+"""What counts as the first minutes."""
+
+Told = Callable[[str, float], None]
+"""Hears what is being worked out and how far it is, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """When POS reaches a level, in seconds since take-off: the median, the least and the most of the draws that
+    got there, which were `reached` of `draws`."""
+
+    pos: float
+    median_s: float | None
+    least_s: float | None
+    most_s: float | None
+    reached: int
+    draws: int
+
+
+@dataclass(frozen=True)
+class Region:
+    """A region of interest: its number, its mass, its size, and its most probable place."""
+
+    number: int
+    mass: float
+    hectares: float
+    peak: LatLon
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """Everything there is to say. Seconds are of flight and count from take-off, `before_s` being the first look.
+
+    Attributes:
+        reachable: the most POS that any search of this grid can get to.
+        path: the search without alarms; `draws` those with.
+        battery_s: how long one battery flies until it is time to go home; `pos_battery` is the POS by then.
+        home_m, home_s: the longest way home, flown and landed.
+        reserve_s: how long what is left of the battery flies then; None when the battery is not known.
+    """
+
+    area: SearchArea
+    grid: Grid
+    settings: Settings
+    regions: tuple[Region, ...]
+    labels: Regions
+    reachable: float
+    before_s: float
+    path: Foresight
+    draws: tuple[Foresight, ...]
+    goals: tuple[Goal, ...]
+    battery_s: float
+    pos_battery: tuple[float, ...]
+    home_m: float
+    home_s: float
+    reserve_s: float | None
+
+
+def preview(
+    area: SearchArea, grid: Grid, settings: Settings, battery_min: float | None, told: Told
+) -> Preview:
+    """Work it out; `battery_min` minutes is what a full battery flies, None: `flight.max_flight_s` is the limit."""
+    flight = settings.flight
+    search = Search(grid, settings)
+    regions = search.regions
+    search.warm_up(lambda name, done, total: told(f"compiling {name}", done / total))
+    reachable = (1.0 - grid.outside) * grid.reachable_mass
+    until = min(max(GOALS), ENOUGH * reachable)
+    start = grid.frame.to_latlon([grid.start])[0]
+    before = climb_seconds(flight) + _route_seconds(
+        grid, settings, grid.launch, (float(start[0]), float(start[1]))
+    )
+    spare = 0.01 * flight.min_battery_percent
+    battery = flight.max_flight_s
+    if battery_min is not None:
+        battery = min(battery, 60.0 * battery_min * (1.0 - spare))
+
+    def fly(name: str, alarms: bool, seed: int) -> Foresight:
+        return foresee(
+            Search(grid, settings),
+            grid.start,
+            most_s=np.inf,
+            until=until,
+            most_steps=MOST_STEPS,
+            rng=np.random.default_rng([settings.run.seed, seed]),
+            false_alarms=alarms,
+            told=lambda seconds, pos: told(name, min(1.0, pos / until)),
+        )
+
+    path = fly("the path", False, DRAWS)
+    draws = tuple(fly(f"search {n + 1} of {DRAWS} with false alarms", True, n) for n in range(DRAWS))
+    home_m, home_s = _longest_way_home(grid, settings)
+    return Preview(
+        area=area,
+        grid=grid,
+        settings=settings,
+        regions=_regions(grid, search),
+        labels=regions,
+        reachable=reachable,
+        before_s=before,
+        path=path,
+        draws=draws,
+        goals=tuple(_goal(pos, draws, before) for pos in GOALS),
+        battery_s=battery,
+        pos_battery=tuple(draw.pos_at(battery - before) for draw in draws),
+        home_m=home_m,
+        home_s=home_s,
+        reserve_s=None if battery_min is None else max(60.0 * battery_min - battery, 0.0),
+    )
+
+
+def first_minutes(seen: Preview) -> list[tuple[float, str]]:
+    """Where the search goes first: seconds since take-off and the ground that is entered then."""
+    said: list[tuple[float, str]] = []
+    here = -1
+    for cell, seconds in zip(seen.path.cells, seen.path.seconds, strict=True):
+        label = int(seen.labels.labels[cell])
+        if seconds > FIRST_S:
+            break
+        if label != here:
+            said.append((seen.before_s + float(seconds), f"ROI {label}" if label else "open ground"))
+            here = label
+    return said
+
+
+def _goal(pos: float, draws: Sequence[Foresight], before: float) -> Goal:
+    times = sorted(before + when for draw in draws if (when := draw.when(pos)) is not None)
+    if 2 * len(times) <= len(draws):  # the median never gets there
+        return Goal(pos, None, None, None, len(times), len(draws))
+    return Goal(pos, float(np.median(times)), times[0], times[-1], len(times), len(draws))
+
+
+def _regions(grid: Grid, search: Search) -> tuple[Region, ...]:
+    mass, labels = search.belief.probability(), search.regions.labels
+    hectare = grid.frame.cell_m**2 / 1e4
+    found = []
+    for number in range(1, search.regions.count + 1):
+        inside = labels == number
+        lat, lon = grid.frame.to_latlon([search.regions.peaks[number - 1]])[0]
+        size = float(grid.covered[inside].sum()) * hectare
+        found.append(Region(number, float(mass[inside].sum()), size, (float(lat), float(lon))))
+    return tuple(found)
+
+
+def _longest_way_home(grid: Grid, settings: Settings) -> tuple[float, float]:
+    """Metres and seconds from the cell that is farthest from the launch point, landing included."""
+    cells = grid.frame.to_latlon(np.argwhere(grid.flyable))
+    metres = grid.frame.to_metres(cells) - grid.frame.to_metres([grid.launch])[0]
+    lat, lon = cells[int(np.hypot(*metres.T).argmax())]
+    legs = _legs(grid, (float(lat), float(lon)), grid.launch)
+    seconds = sum(leg_seconds(leg, settings.flight) for leg in legs) + climb_seconds(settings.flight)
+    return sum(legs), seconds
+
+
+def _route_seconds(grid: Grid, settings: Settings, start: LatLon, end: LatLon) -> float:
+    return sum(leg_seconds(leg, settings.flight) for leg in _legs(grid, start, end))
+
+
+def _legs(grid: Grid, start: LatLon, end: LatLon) -> list[float]:
+    """The legs in metres of the way around what must not be flown over."""
+    metres = grid.frame.to_metres([start, *way_home(grid, start, end)])
+    return [float(length) for length in np.hypot(*np.diff(metres, axis=0).T)]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
 from service.calibration import Calibration
+from service.camera.locate import Spot, spread_hits
 from service.passes import Look, Passes
 from service.reports import Report
 
@@ -209,12 +210,23 @@ class Sensor:
         return Footprint.alike(cells, covered=covered, counts=counts, p_tp=self.p_tp, p_tn=self.p_tn)
 
     def _hits(self, report: Report, footprint: Footprint) -> dict[Cell, float]:
-        """The cells of the footprint that a detection lies in, or next to (its position is not exact)."""
-        hits: dict[Cell, float] = {}
+        """The cells of the footprint that a detection lies in, or next to (its position is not exact); one with a
+        known accuracy is spread over all that it may lie in."""
         if not report.detections or not len(footprint.cells):
-            return hits
+            return {}
+        sure = [
+            (Spot(self.frame.to_metres([[seen.lat, seen.lon]])[0], np.eye(2) * seen.accuracy_m**2), seen)
+            for seen in report.detections
+            if seen.lat is not None and seen.lon is not None and seen.accuracy_m is not None
+        ]
+        hits, _ = spread_hits(
+            [(spot, self._ratio(seen.score)) for spot, seen in sure],
+            footprint.cells, footprint.p_tp, footprint.p_tn, self.frame.cell_m,
+        )  # fmt: skip
         cells, _ = self.frame.locate(np.array([[seen.lat, seen.lon] for seen in report.detections]))
         for cell, seen in zip(cells, report.detections, strict=True):
+            if seen.accuracy_m is not None:
+                continue
             gap = np.abs(footprint.cells - cell).max(axis=1)
             nearest = int(gap.argmin())
             if gap[nearest] <= 1:

@@ -3,8 +3,9 @@
 Neighbouring frames agree with each other, right or wrong, so a video of a cell is one look and not thirty a second.
 A *pass* over a cell goes on while the frames of its source show the cell at all; a frame of that source that does not
 show it ends the pass. So do `again_s` seconds, if frames so far apart are to be looks of their own: what one gains by
-hovering over a place. A pass becomes a look with the first frame that covers the cell well enough, or that has a hit in
-it. Several sources that watch a cell at the same time share its pass: it goes on while any of them shows the cell.
+hovering over a suspect (`sensor.hover_look_s`). A pass becomes a look with the first frame that covers the cell well
+enough, or that has a hit in it. Several sources that watch a cell at the same time share its pass: it goes on while
+any of them shows the cell.
 
 A pass is worth its best frame: a hit replaces a miss, a surer hit a weaker one, a miss from a better place a miss
 from a worse one, and never the reverse. So a calibration is to be made from the best score of each pass.

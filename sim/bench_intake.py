@@ -85,6 +85,7 @@ class Camera:
         self._address, self._rng = address, random.Random(seed)
         self._count = itertools.count()
         self._state: dict[str, Any] = {}
+        self._gone = ""
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._follow, daemon=True)
 
@@ -93,8 +94,8 @@ class Camera:
         self._thread.start()
         deadline = time.monotonic() + patience_s
         while self._state.get("state") not in ("SEARCHING", "CONFIRMING"):
-            if time.monotonic() > deadline:
-                raise RuntimeError(f"the service does not search: {self._state.get('state')}")
+            if self._gone or time.monotonic() > deadline:
+                raise RuntimeError(f"the service does not search: {self._gone or self._state.get('state')}")
             time.sleep(0.1)
 
     def stop(self) -> None:
@@ -126,8 +127,12 @@ class Camera:
     def _follow(self) -> None:
         connection = http.client.HTTPConnection(self._address, timeout=30)
         while not self._ended.wait(0.1):
-            connection.request("GET", "/api/state")
-            state = json.loads(connection.getresponse().read())
+            try:
+                connection.request("GET", "/api/state")
+                state = json.loads(connection.getresponse().read())
+            except (OSError, http.client.HTTPException) as error:
+                self._gone = str(error)
+                return
             if state["pose"] is not None:
                 self._state = state
 

@@ -24,11 +24,11 @@ from service.curve import PosCurve
 from service.errors import BadInput
 from service.evidence import Observation
 from service.flight import LatLon
-from service.journal import Row, read_meta, read_rows
-from service.resume import retrace, stored_settings
+from service.journal import Row
+from service.resume import retrace, stored_run
 from service.search import Search
 from service.states import FINAL, Event, State
-from service.survey import AREA, JOURNAL, PRIOR, survey
+from service.survey import JOURNAL
 from service.suspects import IN_95_PERCENT
 from service.verdict import ROW as VERDICT
 
@@ -173,24 +173,16 @@ class Run:
 
 def read_run(folder: Path) -> Run:
     """Read a run from its folder, whether it is under way or over. Raises BadInput."""
-    journal = folder / JOURNAL
-    settings = stored_settings(journal, {})
-    prior = folder / PRIOR
-    area, grid = survey(folder / AREA, prior if prior.exists() else None, settings)
-    if read_meta(journal, "grid") != grid.frame.to_dict():
-        raise BadInput(
-            f"{folder}: its journal is of another grid than its area file makes; export it unchanged"
-        )
-    rows = list(read_rows(journal))
-    if not rows:
-        raise BadInput(f"{folder}: its journal has nothing in it yet; wait until the search has begun")
+    settings, area, grid, rows = stored_run(folder)
     search = Search(grid, settings)
     curve = PosCurve()
     for row in rows:
         try:
             retrace(row, search)
         except (KeyError, TypeError, ValueError, IndexError) as error:
-            raise BadInput(f"{journal}: row {row.seq} is no {row.kind} that is known ({error})") from error
+            raise BadInput(
+                f"{folder / JOURNAL}: row {row.seq} is no {row.kind} that is known ({error})"
+            ) from error
         if row.kind == "report" and row.body["observation"] is not None:
             curve.add(row.time, search.record.pos)
     reports = [row for row in rows if row.kind == "report"]

@@ -170,7 +170,7 @@ def test_what_is_no_run_is_one_clear_sentence(tmp_path: Path, spoil: object, wor
 
 def test_a_run_that_has_not_begun_or_has_another_grid_is_refused(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path)
-    with pytest.raises(BadInput, match="nothing in it yet"):
+    with pytest.raises(BadInput, match="nothing has happened yet"):
         read_run(tmp_path)
     recorder.journal.set_meta("settings", {**SETTINGS.model_dump(), "sensor": {"cell_m": 40.0}})
     with pytest.raises(BadInput, match="another grid"):

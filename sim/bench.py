@@ -8,6 +8,7 @@ follows it, while a search is flown in which nothing is found.
 from __future__ import annotations
 
 import argparse
+import importlib
 import copy
 import sys
 import time
@@ -255,11 +256,11 @@ def plot(found: list[Growth], path: Path) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the benchmark, or `autopilot`'s; 1 with `--check` when a ratio misses its target, else 0."""
-    if arguments[:1] == ["autopilot"]:
-        from sim.autopilot.bench import main as bench_autopilot
-
-        return bench_autopilot(arguments[1:])
+    """Run the benchmark; 1 with `--check` when a ratio misses its target, else 0. `intake`, `autopilot` are others."""
+    others = {"intake": "sim.bench_intake", "autopilot": "sim.autopilot.bench"}
+    if arguments and arguments[0] in others:
+        code: int = importlib.import_module(others[arguments[0]]).main(arguments[1:])
+        return code
     parser = argparse.ArgumentParser(prog="roisearch-sim bench", description=main.__doc__)
     parser.add_argument("--out", type=Path, default=Path("bench"), help="folder for bench.md and bench.png")
     parser.add_argument("--steps", type=int, default=100, help="decisions that the twin flies (default 100)")

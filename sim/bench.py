@@ -8,8 +8,8 @@ follows it, while a search is flown in which nothing is found.
 from __future__ import annotations
 
 import argparse
-import importlib
 import copy
+import importlib
 import sys
 import time
 from collections.abc import Callable

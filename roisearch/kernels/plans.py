@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch.kernels.chart import Chart, Floats, Ints, begin, copy_table, restore, time_to_clear
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import light_kernel as kernel
 from roisearch.kernels.sweeps import (
     ANYWHERE,
     Wave,

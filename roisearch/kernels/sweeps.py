@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch.kernels.chart import AREA, BLOCK, Chart, Floats, Ints, gain_from, is_full, look
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import light_kernel as kernel
 
 ANYWHERE = -1
 RING, HOLD = 2, 4

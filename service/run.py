@@ -236,6 +236,7 @@ class Service:
         intake = Intake(
             self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
         )
+        intake.believed = self.view.believed.observe
         intake.passes = Passes(again_s=self.settings.sensor.hover_look_s or math.inf)
         mission = Mission(
             settings=self.settings,

@@ -76,8 +76,12 @@ class Detector:
 
 
 def follow(client: httpx.Client, detector: Detector, rate_hz: float, patience_s: float) -> int:
-    """Report frames until the run is over (0) or the service has been silent for `patience_s` (4)."""
+    """Report frames until the run is over (0) or the service has been silent for `patience_s` (4).
+
+    A report without an answer may have arrived or not, so it is sent again as it was: its id counts once.
+    """
     heard, last_pose = time.monotonic(), None
+    unanswered: dict[str, Any] | None = None
     period = 1.0 / rate_hz
     while True:
         began = time.monotonic()
@@ -88,9 +92,12 @@ def follow(client: httpx.Client, detector: Detector, rate_hz: float, patience_s:
                 return 0
             period = 1.0 / (rate_hz * state["speedup"])
             pose = state["pose"]
-            if pose is not None and pose["time"] != last_pose:
+            if unanswered is None and pose is not None and pose["time"] != last_pose:
                 last_pose = pose["time"]
-                client.post("/api/reports", json=detector.frame(state)).raise_for_status()
+                unanswered = detector.frame(state)
+            if unanswered is not None:
+                client.post("/api/reports", json=unanswered).raise_for_status()
+                unanswered = None
         except httpx.HTTPError as error:
             if began - heard > patience_s:
                 print(f"roisearch-sim detector: the service is gone ({error})", file=sys.stderr)

@@ -192,15 +192,14 @@ class Sensor:
         nothing = self._alike(np.empty((0, 2), dtype=np.int64), 0.0)
         if pose.height_m < 0.7 * self.height_m:
             return nothing
-        point = np.array([[pose.lat, pose.lon]])
-        cells, inside = self.frame.locate(point)
-        if not inside[0]:
+        east, south = (self.frame.to_metres([[pose.lat, pose.lon]])[0] / self.frame.cell_m).tolist()
+        rows, cols = self.frame.shape
+        if not (0.0 <= south < rows and 0.0 <= east < cols):
             return nothing
-        cell: Cell = (int(cells[0, 0]), int(cells[0, 1]))
-        centre = np.array([cell[1] + 0.5, cell[0] + 0.5])
-        off = np.abs(self.frame.to_metres(point)[0] / self.frame.cell_m - centre)
+        cell: Cell = (math.floor(south), math.floor(east))
         spare = 0.5 * self.overlap / (1.0 - self.overlap)
-        covered = float(np.prod(1.0 - np.clip(off - spare, 0.0, 1.0)))
+        off = (abs(south - cell[0] - 0.5), abs(east - cell[1] - 0.5))
+        covered = math.prod(1.0 - min(max(along - spare, 0.0), 1.0) for along in off)
         if covered < 0.5 * self.min_covered:
             return nothing
         heading = grid_heading(pose.heading_deg, self.frame.bearing_deg)

@@ -29,7 +29,8 @@ from service.limits import hold_objection
 from service.mavlink import LinkError, Vehicle
 from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
-from service.search import Reason, Search
+from service.reasons import Reason
+from service.search import Search
 from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
 from service.suspects import Found
 from service.takeover import Takeovers
@@ -59,17 +60,18 @@ class Mission:
         intake: Intake,
         may_take_off: bool,
         sent: Callable[[float], None] = lambda seconds: None,
+        thought: Callable[[float], None] = lambda seconds: None,
     ) -> None:
-        """`sent` is told the seconds from a hit's report to its waypoint on the wire."""
+        """`sent` is told the seconds from a hit's report to its waypoint on the wire, `thought` those of a decision."""
         self.settings, self.clock, self.search = settings, clock, search
         self.vehicle, self.journal, self.intake = vehicle, journal, intake
         self.may_take_off = may_take_off
-        self._sent = sent
+        self._sent, self._thought = sent, thought
         self.frame = search.grid.frame
         self.state = State.WAITING
         self.flight = Flight()
         self.found: Found | None = None
-        self.reason = Reason("waiting for the aircraft", ())
+        self.reason = Reason("waiting for the aircraft")
         self.path: tuple[Cell, ...] = ()
         self.why_here = ""  # the reason of the last transition
         self.why_stopped = ""
@@ -128,14 +130,23 @@ class Mission:
             if refusal is not None:
                 log.warning("no hold was sent: %s", refusal.reason)
 
-    async def leave(self, reason: str) -> None:
-        """End the run where it is, for a fault that it cannot go on with: stop the aircraft if it is ours, and tell the
-        pilot, who has it now. Nothing is written: the journal may be what has failed."""
-        self.why_stopped, self.state = reason, State.ABORTED
+    async def leave(self, reason: str, *, stop: bool = True) -> None:
+        """End the run where it is, for a fault that it cannot go on with or on a signal.
+
+        Stops the aircraft, if it is ours and `stop`, and tells the pilot, who has it now.
+        """
+        before, self.state = self.state, State.ABORTED
+        self.why_stopped = reason
         self._drop_thought()
-        refusal = None if self.helm.on_ground() else self.helm.stop()
-        hovering = "" if refusal or self.helm.on_ground() else ", hovering"
-        if self.vehicle.status_text(f"search ABORTED{hovering}: {reason}", _CRITICAL):
+        hovers = stop and not self.helm.on_ground() and self.helm.stop() is None
+        said = self.vehicle.status_text(
+            f"search ABORTED{', hovering' if hovers else ''}: {reason}", _CRITICAL
+        )
+        if self.journal.failed is None:
+            body = {"from": before, "event": Event.ABORT, "to": self.state, "reason": reason}
+            with contextlib.suppress(JournalLost):
+                await self._write("transition", body)
+        if said and hovers:
             await self.clock.sleep(LEAVING_S)  # a stop that is lost is sent again
 
     async def release(self, cause: str, reason: str) -> None:
@@ -303,7 +314,7 @@ class Mission:
             if "detector" in self._holds and not self._detector_silent():
                 await self.release("detector", "the detector reports again")
             elif "link" in self._holds and self.helm.heard():
-                await self.release("link", "the autopilot is heard again")
+                await self._heard_again()
             elif "position" in self._holds and not self.helm.doubts():
                 await self.release("position", "the position is good again")
             elif not self._holds & BLIND and (why := self._energy_low()):
@@ -317,6 +328,18 @@ class Mission:
                 self.why_stopped = self.why_stopped or why
                 await self.happen(Event.RETURN, why)
             await self._tick()
+
+    async def _heard_again(self) -> None:
+        """The autopilot was silent: go on, wait for an operator, or fly home, as the settings say."""
+        said, then = "the autopilot is heard again", self.settings.link.after_silence
+        if then == "hold" and not self._homeward:
+            self._holds.add("operator")
+        self._holds.discard("link")
+        if then == "return" and not self._holds:
+            self.why_stopped = self.why_stopped or "the autopilot was silent"
+            await self.happen(Event.RETURN, said)
+        else:
+            await self.release("link", said)
 
     def _detector_silent(self) -> bool:
         """No report for too long; never shorter than what a busy host may need in wall time."""
@@ -518,10 +541,11 @@ class Mission:
 
     async def _decided(self, decision: Decision) -> None:
         self.flight.decisions += 1
+        self._thought(decision.effort.seconds)
         self.path = decision.path
         self.reason = self.search.reason(decision, self._navigator.waypoint)
         body = {"action": decision.action, "path": decision.path[:16], "reason": self.reason.text}
-        await self._write("decision", body)
+        await self._write("decision", {**body, "options": self.reason.rows()})
 
     def _drop_thought(self) -> None:
         if self._thinking is not None:

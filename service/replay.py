@@ -80,7 +80,7 @@ class ReplayView(BaseView):
         if read_meta(journal, "grid") != grid.frame.to_dict():
             raise BadInput(f"{folder}: its journal is of another grid than its area file makes")
         search = Search(grid, settings)
-        super().__init__(area, search, make_sensor(settings, grid, search.fov), settings)
+        super().__init__(area, search, make_sensor(settings, grid), settings)
         self.registry = CollectorRegistry()
         self.rows = list(read_rows(journal))
         if not self.rows:

@@ -50,7 +50,7 @@ def test_every_profile_has_a_sensor_and_a_field_of_view(tmp_path: Path) -> None:
         ({"camera_pitch_deg": -5.0}, "tilt the camera down"),
         ({"max_range_m": 50.0}, "tilt the camera down"),
         ({"target_size_m": 0.1}, "fly lower or take a longer lens"),
-        ({"cell_m": 60.0}, "smaller cells"),
+        ({"cell_m": 90.0}, "smaller cells"),
         ({"terrain_file": "no-such.tif"}, "no such height model"),
         ({"calibration_file": "no-such.csv"}, "no-such.csv"),
     ],

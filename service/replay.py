@@ -73,7 +73,7 @@ class ReplayView(BaseView):
     def __init__(self, folder: Path) -> None:
         settings, area, grid, self.rows = stored_run(folder)
         search = Search(grid, settings)
-        super().__init__(area, search, make_sensor(settings, grid, search.fov), settings)
+        super().__init__(area, search, make_sensor(settings, grid), settings)
         self.registry = CollectorRegistry()
         self.times = monotone([row.time for row in self.rows])
         self._track: list[LatLon] = []

@@ -52,6 +52,7 @@ class LinkSettings(Section):
     signing_key_file: str = ""
     system_id: int = Field(default=0, ge=0, le=255)
     silent_after_s: float = Field(default=3.0, gt=0.5, le=60)
+    after_silence: Literal["resume", "hold", "return"] = "resume"
     connect_timeout_s: float = Field(default=120.0, gt=0)
     speedup: float | None = Field(default=None, ge=1, le=100)
 

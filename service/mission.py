@@ -130,14 +130,23 @@ class Mission:
             if refusal is not None:
                 log.warning("no hold was sent: %s", refusal.reason)
 
-    async def leave(self, reason: str) -> None:
-        """End the run where it is, for a fault that it cannot go on with: stop the aircraft if it is ours, and tell the
-        pilot, who has it now. Nothing is written: the journal may be what has failed."""
-        self.why_stopped, self.state = reason, State.ABORTED
+    async def leave(self, reason: str, *, stop: bool = True) -> None:
+        """End the run where it is, for a fault that it cannot go on with or on a signal.
+
+        Stops the aircraft, if it is ours and `stop`, and tells the pilot, who has it now.
+        """
+        before, self.state = self.state, State.ABORTED
+        self.why_stopped = reason
         self._drop_thought()
-        refusal = None if self.helm.on_ground() else self.helm.stop()
-        hovering = "" if refusal or self.helm.on_ground() else ", hovering"
-        if self.vehicle.status_text(f"search ABORTED{hovering}: {reason}", _CRITICAL):
+        hovers = stop and not self.helm.on_ground() and self.helm.stop() is None
+        said = self.vehicle.status_text(
+            f"search ABORTED{', hovering' if hovers else ''}: {reason}", _CRITICAL
+        )
+        if self.journal.failed is None:
+            body = {"from": before, "event": Event.ABORT, "to": self.state, "reason": reason}
+            with contextlib.suppress(JournalLost):
+                await self._write("transition", body)
+        if said and hovers:
             await self.clock.sleep(LEAVING_S)  # a stop that is lost is sent again
 
     async def release(self, cause: str, reason: str) -> None:
@@ -305,7 +314,7 @@ class Mission:
             if "detector" in self._holds and not self._detector_silent():
                 await self.release("detector", "the detector reports again")
             elif "link" in self._holds and self.helm.heard():
-                await self.release("link", "the autopilot is heard again")
+                await self._heard_again()
             elif "position" in self._holds and not self.helm.doubts():
                 await self.release("position", "the position is good again")
             elif not self._holds & BLIND and (why := self._energy_low()):
@@ -319,6 +328,18 @@ class Mission:
                 self.why_stopped = self.why_stopped or why
                 await self.happen(Event.RETURN, why)
             await self._tick()
+
+    async def _heard_again(self) -> None:
+        """The autopilot was silent: go on, wait for an operator, or fly home, as the settings say."""
+        said, then = "the autopilot is heard again", self.settings.link.after_silence
+        if then == "hold" and not self._homeward:
+            self._holds.add("operator")
+        self._holds.discard("link")
+        if then == "return" and not self._holds:
+            self.why_stopped = self.why_stopped or "the autopilot was silent"
+            await self.happen(Event.RETURN, said)
+        else:
+            await self.release("link", said)
 
     def _detector_silent(self) -> bool:
         """No report for too long; never shorter than what a busy host may need in wall time."""

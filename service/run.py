@@ -37,7 +37,7 @@ from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
 from service.search import Search
 from service.sensors import Profile, make_sensor
-from service.states import FINAL, State
+from service.states import FINAL
 from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.view import RunView
 
@@ -305,8 +305,7 @@ class Service:
                 log.error("%s", error)
             await mission.leave(str(group.exceptions[0]))
         except* asyncio.CancelledError:
-            mission.why_stopped = "stopped by a signal"
-            mission.state = State.ABORTED
+            await mission.leave("stopped by a signal", stop=False)
         finally:
             display.cancel()
             watch.cancel()

@@ -204,7 +204,7 @@ class Flight:
         began = last = -np.inf
         began = time.monotonic()
         while self._service.process.poll() is None and self._state() not in _FINAL:
-            if self._state() in (*_FLYING, "HOLDING", "YIELDED") and time.monotonic() - last > 3.0:
+            if self._state() in (*_FLYING, "FOUND", "HOLDING", "YIELDED") and time.monotonic() - last > 3.0:
                 last = time.monotonic()
                 self._order("return")
             if time.monotonic() - began > _PATIENCE_S:

@@ -150,6 +150,15 @@ class Watch:
         count: int = self.page.evaluate(script, layer)
         return count
 
+    def cell(self, row: int, col: int) -> int:
+        """How opaque a cell of the heat layer is, 0 to 255."""
+        script = """([row, col]) => {
+          const canvas = [...document.querySelectorAll("canvas.cells")].find((each) => each.ariaLabel.includes("Heat"));
+          return canvas.getContext("2d").getImageData(col, row, 1, 1).data[3];
+        }"""
+        alpha: int = self.page.evaluate(script, [row, col])
+        return alpha
+
     def close(self) -> None:
         """Close the page; it must have had nothing to complain about."""
         self.context.close()

@@ -303,6 +303,9 @@ class Service:
             await mission.leave(str(group.exceptions[0]))
         except* asyncio.CancelledError:
             await mission.leave("stopped by a signal", stop=False)
+        except* Exception as group:  # a mistake of ours: the aircraft does not fly on into it
+            await mission.leave(f"internal error, {group.exceptions[0]!r}")
+            raise
         finally:
             display.cancel()
             watch.cancel()

@@ -47,6 +47,17 @@ def test_a_pilot_who_took_over_during_a_stall_has_the_aircraft(tmp_path: Path) -
         assert scene.tap.motions[motions:] == [], scene.service.said
 
 
+def test_a_mistake_of_ours_stops_the_aircraft_and_tells_the_pilot(tmp_path: Path) -> None:
+    with flight(tmp_path, "ardupilot", module=STALLING) as scene:
+        scene.searching()
+        scene.service.process.send_signal(signal.SIGUSR2)
+        assert scene.service.exit_code() == 1
+        assert "ZeroDivisionError: a mistake" in scene.service.said
+        assert any(text.startswith("search ABORTED, hovering: internal error") for text in scene.tap.texts)
+        scene.fly(5.0)
+        assert scene.control.state()["speed"] < 1.0
+
+
 def test_a_full_disk_in_flight_stops_the_aircraft_and_tells_the_pilot(tmp_path: Path) -> None:
     with flight(tmp_path) as scene:
         scene.searching()

@@ -47,6 +47,8 @@ def test_flags_win_over_environment_and_environment_over_file(tmp_path: Path) ->
             ["sensor.profile", "fisheye", "'wide-angle' or 'camera'"],
         ),
         ("[sensor\n", ["is not TOML", "line 1"]),
+        ("[flight]\naltitude_m = 150\n", ["flight.altitude_m", "150", "max_height_m = 120"]),
+        ("[flight]\nmin_height_m = 40\n", ["flight.altitude_m", "30", "min_height_m = 40"]),
     ],
 )
 def test_a_wrong_setting_is_named_with_what_is_allowed(tmp_path: Path, text: str, words: list[str]) -> None:

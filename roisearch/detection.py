@@ -33,6 +33,10 @@ class DetectionRecord:
         """Cumulative probability of detection of each cell, float [rows, cols]."""
         return np.asarray(1.0 - self._missed)
 
+    def undetected(self) -> NDArray[np.float64]:
+        """The prior mass of each cell that no look so far would have detected, float [rows, cols]."""
+        return np.asarray(self._poa * self._missed)
+
     @property
     def pos(self) -> float:
         """Probability that the target would have been detected by now."""

@@ -135,6 +135,12 @@ class HttpSettings(Section):
     body_timeout_s: float = Field(default=5.0, gt=0, le=300)
 
 
+class PageSettings(Section):
+    tiles_url: str = ""
+    tiles_attribution: str = ""
+    mbtiles_file: str = ""
+
+
 class DoorSettings(Section):
     udp: str = ""
     unix: str = ""
@@ -161,6 +167,7 @@ class Settings(Section):
     sensor: SensorSettings = SensorSettings()
     search: SearchSettings = SearchSettings()
     http: HttpSettings = HttpSettings()
+    page: PageSettings = PageSettings()
     doors: DoorSettings = DoorSettings()
     run: RunSettings = RunSettings()
     demo: DemoSettings = DemoSettings()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
 from service.calibration import Calibration
+from service.camera.locate import Spot, spread_hits
 from service.passes import Look, Passes
 from service.reports import Report
 
@@ -191,15 +192,14 @@ class Sensor:
         nothing = self._alike(np.empty((0, 2), dtype=np.int64), 0.0)
         if pose.height_m < 0.7 * self.height_m:
             return nothing
-        point = np.array([[pose.lat, pose.lon]])
-        cells, inside = self.frame.locate(point)
-        if not inside[0]:
+        east, south = (self.frame.to_metres([[pose.lat, pose.lon]])[0] / self.frame.cell_m).tolist()
+        rows, cols = self.frame.shape
+        if not (0.0 <= south < rows and 0.0 <= east < cols):
             return nothing
-        cell: Cell = (int(cells[0, 0]), int(cells[0, 1]))
-        centre = np.array([cell[1] + 0.5, cell[0] + 0.5])
-        off = np.abs(self.frame.to_metres(point)[0] / self.frame.cell_m - centre)
+        cell: Cell = (math.floor(south), math.floor(east))
         spare = 0.5 * self.overlap / (1.0 - self.overlap)
-        covered = float(np.prod(1.0 - np.clip(off - spare, 0.0, 1.0)))
+        off = (abs(south - cell[0] - 0.5), abs(east - cell[1] - 0.5))
+        covered = math.prod(1.0 - min(max(along - spare, 0.0), 1.0) for along in off)
         if covered < 0.5 * self.min_covered:
             return nothing
         heading = grid_heading(pose.heading_deg, self.frame.bearing_deg)
@@ -210,12 +210,23 @@ class Sensor:
         return Footprint.alike(cells, covered=covered, counts=counts, p_tp=self.p_tp, p_tn=self.p_tn)
 
     def _hits(self, report: Report, footprint: Footprint) -> dict[Cell, float]:
-        """The cells of the footprint that a detection lies in, or next to (its position is not exact)."""
-        hits: dict[Cell, float] = {}
+        """The cells of the footprint that a detection lies in, or next to (its position is not exact); one with a
+        known accuracy is spread over all that it may lie in."""
         if not report.detections or not len(footprint.cells):
-            return hits
+            return {}
+        sure = [
+            (Spot(self.frame.to_metres([[seen.lat, seen.lon]])[0], np.eye(2) * seen.accuracy_m**2), seen)
+            for seen in report.detections
+            if seen.lat is not None and seen.lon is not None and seen.accuracy_m is not None
+        ]
+        hits, _ = spread_hits(
+            [(spot, self._ratio(seen.score)) for spot, seen in sure],
+            footprint.cells, footprint.p_tp, footprint.p_tn, self.frame.cell_m,
+        )  # fmt: skip
         cells, _ = self.frame.locate(np.array([[seen.lat, seen.lon] for seen in report.detections]))
         for cell, seen in zip(cells, report.detections, strict=True):
+            if seen.accuracy_m is not None:
+                continue
             gap = np.abs(footprint.cells - cell).max(axis=1)
             nearest = int(gap.argmin())
             if gap[nearest] <= 1:

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch import SearchState
+from service.evidence import Footprint, Reading, observe
 from service.navigator import Cell, heading_between
 from service.pace import cell_seconds, leg_seconds
+from service.passes import Passes
 from service.search import Search
 
 HEED = 8
@@ -64,32 +66,35 @@ def foresee(
     `told` hears how far it is, in seconds of flight and POS.
     """
     settings, shape = search.settings, search.grid.frame.shape
-    sensor, flight, cell_m = settings.sensor, settings.flight, search.grid.frame.cell_m
+    flight, cell_m = settings.flight, search.grid.frame.cell_m
     cells, pos, stops = [start], [], []
     heading, alarms, flown = "north", 0, 0.0
-    in_view: set[Cell] = set()
+    passes = Passes()
 
     def look() -> bool:
         """Look from the last cell; True when the detector raised an alarm."""
-        nonlocal in_view, alarms
-        seen = search.fov.cells(cells[-1], heading, shape)
-        fresh = np.array([tuple(cell) not in in_view for cell in seen.tolist()], dtype=np.bool_)
-        in_view = {(row, col) for row, col in seen.tolist()}
-        looked = seen[fresh]
-        hits = (
-            rng.random(len(looked)) >= sensor.p_tn if false_alarms else np.zeros(len(looked), dtype=np.bool_)
-        )
-        if len(looked):
-            search.belief.observe(looked, hits, sensor.p_tp, sensor.p_tn)
-            search.record.look(looked, np.full(len(looked), sensor.p_tp))
+        nonlocal alarms
+        seen, p_tp, p_tn = search.fov.looks(cells[-1], heading, shape)
+        hits: dict[Cell, float] = {}
+        if false_alarms:
+            draws = rng.random(len(seen)) >= p_tn
+            for (row, col), alarm, tp, tn in zip(seen.tolist(), draws, p_tp, p_tn, strict=True):
+                if alarm and (row, col) not in passes:
+                    hits[row, col] = float(tp / (1.0 - tn))
+        whole = np.ones(len(seen))
+        reading = Reading(Footprint(seen, whole, whole > 0.0, p_tp, p_tn), hits)
+        observation = observe(passes, "foresight", flown, reading)
+        passes.settle()
+        if observation is not None:
+            search.apply(observation)
         pos.append(search.record.pos)
-        alarms += int(hits.sum())
-        return bool(hits.any())
+        alarms += len(hits)
+        return bool(hits)
 
     look()
     while pos[-1] < until and flown < most_s and len(cells) <= most_steps:
         state = SearchState(cell=cells[-1], heading=heading)
-        decision = search.planner.plan(search.belief, state, rng, deadline_s=settings.search.deadline_s)
+        decision = search.planner.plan(search.belief, state, rng)  # without a deadline: the same every time
         for cell in decision.path[:HEED]:
             turned = heading_between(cells[-1], cell)
             flown += leg_seconds(cell_m, flight) if turned != heading else cell_m / flight.speed_mps

@@ -277,3 +277,17 @@ def read_rows(path: Path, *kinds: str) -> Iterator[Row]:
         raise BadInput(f"{path}: the journal cannot be read ({error})") from error
     finally:
         database.close()
+
+
+def read_last(path: Path, kind: str, count: int, before: float | None = None) -> list[Row]:
+    """The last rows of a kind, the newest first, or the last until a time; raises BadInput like `read_rows`."""
+    database = _open_to_read(path)
+    try:
+        query = "SELECT seq, time, kind, key, body FROM events WHERE kind = ? AND time <= ? ORDER BY seq DESC LIMIT ?"
+        until = 1e300 if before is None else before
+        found = database.execute(query, (kind, until, count)).fetchall()
+        return [Row(seq, time, kind, key, json.loads(body)) for seq, time, kind, key, body in found]
+    except sqlite3.Error as error:
+        raise BadInput(f"{path}: the journal cannot be read ({error})") from error
+    finally:
+        database.close()

@@ -29,7 +29,8 @@ from service.limits import hold_objection
 from service.mavlink import LinkError, Vehicle
 from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
-from service.search import Reason, Search
+from service.reasons import Reason
+from service.search import Search
 from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
 from service.suspects import Found
 from service.takeover import Takeovers
@@ -59,17 +60,18 @@ class Mission:
         intake: Intake,
         may_take_off: bool,
         sent: Callable[[float], None] = lambda seconds: None,
+        thought: Callable[[float], None] = lambda seconds: None,
     ) -> None:
-        """`sent` is told the seconds from a hit's report to its waypoint on the wire."""
+        """`sent` is told the seconds from a hit's report to its waypoint on the wire, `thought` those of a decision."""
         self.settings, self.clock, self.search = settings, clock, search
         self.vehicle, self.journal, self.intake = vehicle, journal, intake
         self.may_take_off = may_take_off
-        self._sent = sent
+        self._sent, self._thought = sent, thought
         self.frame = search.grid.frame
         self.state = State.WAITING
         self.flight = Flight()
         self.found: Found | None = None
-        self.reason = Reason("waiting for the aircraft", ())
+        self.reason = Reason("waiting for the aircraft")
         self.path: tuple[Cell, ...] = ()
         self.why_here = ""  # the reason of the last transition
         self.why_stopped = ""
@@ -539,10 +541,11 @@ class Mission:
 
     async def _decided(self, decision: Decision) -> None:
         self.flight.decisions += 1
+        self._thought(decision.effort.seconds)
         self.path = decision.path
         self.reason = self.search.reason(decision, self._navigator.waypoint)
         body = {"action": decision.action, "path": decision.path[:16], "reason": self.reason.text}
-        await self._write("decision", body)
+        await self._write("decision", {**body, "options": self.reason.rows()})
 
     def _drop_thought(self) -> None:
         if self._thinking is not None:

@@ -13,7 +13,10 @@ import numpy as np
 
 from roisearch import Regions
 from service.area import Grid, SearchArea, way_home
+from service.area.projection import FloatArray
 from service.config import Settings
+from service.energy import Energy, WayHome
+from service.errors import BadInput
 from service.flight import LatLon
 from service.foresight import Foresight, foresee
 from service.pace import climb_seconds, leg_seconds
@@ -60,11 +63,11 @@ class Preview:
     """Everything there is to say. Seconds are of flight and count from take-off, `before_s` being the first look.
 
     Attributes:
-        reachable: the most POS that any search of this grid can get to.
+        reachable: the most POS that any search of this grid can get to, with a wide footprint at most this.
         path: the search without alarms; `draws` those with.
         battery_s: how long one battery flies until it is time to go home; `pos_battery` is the POS by then.
-        home_m, home_s: the longest way home, flown and landed.
-        reserve_s: how long what is left of the battery flies then; None when the battery is not known.
+        home: the longest way home, in no wind, landing included.
+        kept_percent: what is left of the battery then, for that way and as a reserve; None: no battery is known.
     """
 
     area: SearchArea
@@ -79,9 +82,8 @@ class Preview:
     goals: tuple[Goal, ...]
     battery_s: float
     pos_battery: tuple[float, ...]
-    home_m: float
-    home_s: float
-    reserve_s: float | None
+    home: WayHome
+    kept_percent: float | None
 
 
 def preview(
@@ -92,16 +94,24 @@ def preview(
     search = Search(grid, settings)
     regions = search.regions
     search.warm_up(lambda name, done, total: told(f"compiling {name}", done / total))
-    reachable = (1.0 - grid.outside) * grid.reachable_mass
+    seen = grid.reachable_mass if search.fov.is_point else 1.0  # a wider footprint sees over the edge
+    reachable = (1.0 - grid.outside) * seen
     until = min(max(GOALS), ENOUGH * reachable)
     start = grid.frame.to_latlon([grid.start])[0]
     before = climb_seconds(flight) + _route_seconds(
         grid, settings, grid.launch, (float(start[0]), float(start[1]))
     )
-    spare = 0.01 * flight.min_battery_percent
-    battery = flight.max_flight_s
+    home = _longest_way_home(grid, settings)
+    battery, kept = flight.max_flight_s, None
     if battery_min is not None:
-        battery = min(battery, 60.0 * battery_min * (1.0 - spare))
+        energy = Energy(100.0, 100.0 / (60.0 * battery_min), home)
+        battery = min(battery, energy.seconds_left(flight) or 0.0)
+        kept = 100.0 - 100.0 * battery / (60.0 * battery_min)
+        if battery <= before:
+            raise BadInput(
+                f"a battery of {battery_min:g} minutes is too small: from the farthest cell the way home takes "
+                f"{home.seconds / 60:.1f}, and flight.reserve_percent = {flight.reserve_percent:g} are kept"
+            )
 
     def fly(name: str, alarms: bool, seed: int) -> Foresight:
         return foresee(
@@ -117,7 +127,6 @@ def preview(
 
     path = fly("the path", False, DRAWS)
     draws = tuple(fly(f"search {n + 1} of {DRAWS} with false alarms", True, n) for n in range(DRAWS))
-    home_m, home_s = _longest_way_home(grid, settings)
     return Preview(
         area=area,
         grid=grid,
@@ -131,9 +140,8 @@ def preview(
         goals=tuple(_goal(pos, draws, before) for pos in GOALS),
         battery_s=battery,
         pos_battery=tuple(draw.pos_at(battery - before) for draw in draws),
-        home_m=home_m,
-        home_s=home_s,
-        reserve_s=None if battery_min is None else max(60.0 * battery_min - battery, 0.0),
+        home=home,
+        kept_percent=kept,
     )
 
 
@@ -170,21 +178,21 @@ def _regions(grid: Grid, search: Search) -> tuple[Region, ...]:
     return tuple(found)
 
 
-def _longest_way_home(grid: Grid, settings: Settings) -> tuple[float, float]:
-    """Metres and seconds from the cell that is farthest from the launch point, landing included."""
+def _longest_way_home(grid: Grid, settings: Settings) -> WayHome:
+    """From the cell that is farthest from the launch point, as the flight itself will reckon it."""
     cells = grid.frame.to_latlon(np.argwhere(grid.flyable))
     metres = grid.frame.to_metres(cells) - grid.frame.to_metres([grid.launch])[0]
     lat, lon = cells[int(np.hypot(*metres.T).argmax())]
-    legs = _legs(grid, (float(lat), float(lon)), grid.launch)
-    seconds = sum(leg_seconds(leg, settings.flight) for leg in legs) + climb_seconds(settings.flight)
-    return sum(legs), seconds
+    points = _metres(grid, (float(lat), float(lon)), grid.launch)
+    flight = settings.flight
+    return WayHome.along([(east, -south) for east, south in points.tolist()], flight.altitude_m, None, flight)
 
 
 def _route_seconds(grid: Grid, settings: Settings, start: LatLon, end: LatLon) -> float:
-    return sum(leg_seconds(leg, settings.flight) for leg in _legs(grid, start, end))
+    legs = np.hypot(*np.diff(_metres(grid, start, end), axis=0).T)
+    return sum(leg_seconds(float(length), settings.flight) for length in legs)
 
 
-def _legs(grid: Grid, start: LatLon, end: LatLon) -> list[float]:
-    """The legs in metres of the way around what must not be flown over."""
-    metres = grid.frame.to_metres([start, *way_home(grid, start, end)])
-    return [float(length) for length in np.hypot(*np.diff(metres, axis=0).T)]
+def _metres(grid: Grid, start: LatLon, end: LatLon) -> FloatArray:
+    """The way around what must not be flown over, its start included, in metres of the grid [k, 2]."""
+    return grid.frame.to_metres([start, *way_home(grid, start, end)])

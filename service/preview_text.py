@@ -38,12 +38,15 @@ def facts(seen: Preview) -> list[tuple[str, str]]:
     least, most = min(seen.pos_battery), max(seen.pos_battery)
     known = (
         "one battery"
-        if seen.reserve_s is not None
+        if seen.kept_percent is not None
         else "one flight (flight.max_flight_s; no --battery given)"
     )
     said.append(("battery", f"{known} searches until {_clock(seen.battery_s)}: POS {_span(least, most)}"))
     said.append(
-        ("way home", f"at most {seen.home_m:.0f} m, {_clock(seen.home_s)} with landing{_reserve(seen)}")
+        (
+            "way home",
+            f"at most {seen.home.length_m:.0f} m, {_clock(seen.home.seconds)} with landing{_kept(seen)}",
+        )
     )
     said.append(
         (
@@ -71,15 +74,8 @@ def _goal(goal: Goal, seen: Preview) -> str:
     return f"after about {_clock(goal.median_s)} ({_clock(goal.least_s)} to {_clock(goal.most_s)}){more}"
 
 
-def _reserve(seen: Preview) -> str:
-    if seen.reserve_s is None:
-        return ""
-    if seen.reserve_s < seen.home_s:
-        return (
-            f"; THE RESERVE IS TOO SMALL: {seen.settings.flight.min_battery_percent:g} % of the battery fly "
-            f"{_clock(seen.reserve_s)}, raise flight.min_battery_percent"
-        )
-    return f"; the reserve of {seen.settings.flight.min_battery_percent:g} % flies {_clock(seen.reserve_s)}"
+def _kept(seen: Preview) -> str:
+    return "" if seen.kept_percent is None else f"; {seen.kept_percent:.0f} % of the battery are kept for it"
 
 
 def _span(least: float, most: float) -> str:

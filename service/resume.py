@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,15 @@ def retrace(row: Row, search: Search) -> None:
         search.apply(Observation.from_dict(row.body["observation"]))
 
 
-def replay(journal: Path, search: Search, intake: Intake) -> int:
+def replay(
+    journal: Path,
+    search: Search,
+    intake: Intake,
+    told: Callable[[float, float], None] = lambda time, pos: None,
+) -> int:
     """Apply the journalled observations and verdicts to a fresh search, in their order.
 
-    Returns how many reports there were.
+    `told` hears the time of each row and the POS after it. Returns how many reports there were.
     """
     ids = set()
     for row in read_rows(journal, "report", VERDICT):
@@ -44,6 +50,7 @@ def replay(journal: Path, search: Search, intake: Intake) -> int:
             raise BadInput(
                 f"{journal}: row {row.seq} is no {row.kind} that this version knows ({error})"
             ) from error
+        told(row.time, search.record.pos)
     intake.remember(ids)
     intake.accepted = len(ids)
     return len(ids)

@@ -87,7 +87,7 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
 def _open(settings: Settings) -> Iterator[tuple[Door, Doors]]:
     """Take every address before anything starts, and give them up at the end; raises BadInput."""
     with (
-        contextlib.closing(open_door(settings.http, os.environ)) as door,
+        contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door,
         contextlib.closing(open_doors(settings.doors)) as doors,
     ):
         yield door, doors
@@ -131,6 +131,7 @@ def _search(
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
         service = Service(area, search, sensor, settings, folder, console)
+        service.view.estimator.warm_up()
         return asyncio.run(service.fly(door, doors, journal, signing_key))
     finally:
         journal.close()
@@ -229,6 +230,7 @@ class Service:
             return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment, *attitude)
 
         def observed(observation: Observation, arrived: float) -> None:
+            self.view.curve.add(self.clock.now(), self.search.record.pos)
             mission.observed(observation, arrived)
 
         intake = Intake(
@@ -244,8 +246,9 @@ class Service:
             intake=intake,
             may_take_off=self.settings.mock or self.settings.flight.takeoff,
             sent=self.view.latency.observe,
+            thought=self.view.thinking.observe,
         )
-        replayed = replay(journal.path, self.search, intake)
+        replayed = replay(journal.path, self.search, intake, self.view.curve.add)
         if replayed:
             log.info(
                 "resumed: %d reports of the earlier run, POS %.1f %%", replayed, 100 * self.search.record.pos

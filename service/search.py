@@ -10,7 +10,6 @@ import asyncio
 import functools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,18 +20,11 @@ from roisearch.place import Place, most_likely_place, place_at
 from service.area import Grid
 from service.config import Settings
 from service.evidence import Observation
+from service.reasons import Reason, explain
 from service.sensors import field_of_view
 from service.suspects import Found, Sightings
 
 Cell = tuple[int, int]
-
-
-@dataclass(frozen=True)
-class Reason:
-    """Why the aircraft goes where it goes, for a person: one line, and the root options with their visits."""
-
-    text: str
-    options: tuple[tuple[str, int, float], ...]
 
 
 class Search:
@@ -66,6 +58,11 @@ class Search:
         self.record.look(observation.cells[observation.first], observation.p_tp[observation.first])
         self.sightings.add(observation.speaking, observation.sightings)
         self._place = None
+
+    def go_back(self, belief: Belief, record: DetectionRecord, sightings: Sightings) -> None:
+        """Take up an earlier state of these, which are ours from now on."""
+        self.belief, self.record, self.sightings = belief, record, sightings
+        self._place = self.confirmed = None
 
     def judge(self, cell: Cell, observation: Observation, *, confirmed: bool) -> None:
         """Take in what an operator says about the place around `cell`."""
@@ -117,21 +114,7 @@ class Search:
 
     def reason(self, decision: Decision, cell: Cell) -> Reason:
         """The decision in words: where to, how much is there, how far, and what else was weighed."""
-        ranked = sorted(decision.alternatives, key=lambda option: -option.visits)
-        options = tuple((option.action, option.visits, option.value) for option in ranked)
-        goal = decision.goal or decision.path[-1]
-        label = int(self.regions.labels[goal])
-        distance = self.distance(cell, goal)
-        if label:
-            mass = float(self.belief.probability()[self.regions.labels == label].sum())
-            where = f"ROI {label}: {mass:.0%} of the probability, {distance:.0f} m"
-        else:
-            where = f"open ground, {distance:.0f} m"
-        return Reason(f"{decision.action} → {where}", options)
-
-    def distance(self, here: Cell, there: Cell) -> float:
-        """Metres between two cells along the grid."""
-        return (abs(here[0] - there[0]) + abs(here[1] - there[1])) * self.grid.frame.cell_m
+        return explain(decision, cell, self.belief.probability(), self.regions, self.grid.frame.cell_m)
 
     def nearest_flyable(self, cell: Cell) -> Cell:
         """The flyable cell nearest to `cell`, itself if it is flyable."""

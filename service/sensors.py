@@ -119,6 +119,7 @@ def camera_sensor(settings: Settings, frame: GridFrame, ground: Ground | None = 
         min_covered=sensor.min_covered,
         max_range_m=sensor.max_range_m,
         min_grazing_deg=sensor.min_grazing_deg,
+        calibration=calibration_of(settings),
         errors=Errors(sensor.attitude_sigma_deg, sensor.position_sigma_m, sensor.height_sigma_m),
     )
 

@@ -7,6 +7,7 @@ told as the straight line through both ends.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ _POINTS = 233  # of a Fibonacci lattice, which fills the square evenly in both d
 _LATTICE = np.stack([np.arange(_POINTS), np.arange(_POINTS) * 144 % _POINTS], axis=1)
 _CLOUD = ndtri((_LATTICE + 0.5) / _POINTS)
 _CLOUD /= _CLOUD.std(axis=0)
+_LEAST_INSIDE = 0.05  # a detection with less of its probability in the cells looked at lies beside them
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,43 @@ def spread(spot: Spot, cell_m: float) -> dict[Cell, float]:
     cells = np.floor((spot.point + _CLOUD @ root.T) / cell_m).astype(np.int64)
     found, counts = np.unique(cells[:, ::-1], axis=0, return_counts=True)
     return {(int(r), int(c)): float(n) / len(_CLOUD) for (r, c), n in zip(found, counts, strict=True)}
+
+
+def spread_hits(
+    found: Sequence[tuple[Spot, float | None]],
+    cells: NDArray[np.int64],
+    p_tp: Floats,
+    p_tn: Floats,
+    cell_m: float,
+) -> tuple[dict[Cell, float], list[int]]:
+    """What detections that may each be the hit of several cells say about the cells looked at.
+
+    In each cell in view the detector has a hit or has none, as always (p_tp, p_tn); which cell a detection is the hit
+    of is known only with the share s_c (see `shares`). Summing over the cells gives Bayes' rule for cell c exactly:
+    its odds are multiplied by s_c * L + (1 - s_c) * (1 - p_tp) / p_tn, the mean of a hit and a miss, with the hit's
+    likelihood ratio L = p_tp / (1 - p_tn) unless it has one of its own. Several detections that share no cell are
+    exact too; of those that do, one at least is a hit of the cell with 1 - prod(1 - s_c), and L is their mean.
+
+    Args:
+        found: where each detection is, and its likelihood ratio, None for the cell's.
+        cells, p_tp, p_tn: int [k, 2], float [k]: the cells that count as looked at.
+
+    Returns:
+        The likelihood ratio of every cell that a detection may be a hit of, and which of `found` lie in these cells.
+    """
+    none, weight, worth = np.ones(len(cells)), np.zeros(len(cells)), np.zeros(len(cells))
+    on_it = []
+    for number, (spot, ratio) in enumerate(found):
+        share, inside = shares(spread(spot, cell_m), cells, p_tn)
+        if inside >= _LEAST_INSIDE:
+            on_it.append(number)
+            none *= 1.0 - share
+            weight += share
+            worth += share * (p_tp / (1.0 - p_tn) if ratio is None else ratio)
+    one = 1.0 - none
+    total = one * worth / np.maximum(weight, 1e-300) + (1.0 - one) * (1.0 - p_tp) / p_tn
+    hit = np.flatnonzero(weight > 0.0)
+    return {(int(cells[i, 0]), int(cells[i, 1])): float(total[i]) for i in hit}, on_it
 
 
 def shares(

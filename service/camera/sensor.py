@@ -3,15 +3,6 @@
 What a report tells about its camera (gimbal, intrinsics, the footprint's outline) goes before the settings. A
 detection with a pixel box is projected onto the ground with its uncertainty; one with latitude and longitude has its
 own `accuracy_m`, else what the camera's errors make of that place.
-
-The model of a hit that may lie in several cells: in each cell in view the detector has a hit or has none, as always
-(p_tp, p_tn); which cell a detection is the hit of is known only with the share s_c. Summing over the cells gives
-Bayes' rule for cell c exactly: its odds are multiplied by
-
-    s_c * p_tp / (1 - p_tn)  +  (1 - s_c) * (1 - p_tp) / p_tn
-
-the mean of a hit and a miss. Several detections that share no cell are exact too; of those that do, one at least is a
-hit of the cell with 1 - prod(1 - s_c).
 """
 
 from __future__ import annotations
@@ -25,15 +16,14 @@ from numpy.typing import NDArray
 
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
+from service.calibration import Calibration
 from service.camera.detect import Detectability
 from service.camera.ground import Flat, Ground
-from service.camera.locate import Errors, Spot, locate_pixel, shares, spread
+from service.camera.locate import Errors, Spot, locate_pixel, spread_hits
 from service.camera.look import Looks, look_at_cells
 from service.camera.optics import Pinhole, Sight, rotation, sight_from
-from service.evidence import Cell, Footprint, Pose, Reading, Sighting, Unreadable
+from service.evidence import Footprint, Pose, Reading, Sighting, Unreadable
 from service.reports import Detection, Gimbal, Intrinsics, Report
-
-_LEAST_ON_FOOTPRINT = 0.05  # a detection with less of its probability in the cells looked at lies beside them
 
 
 @dataclass(frozen=True)
@@ -61,6 +51,7 @@ class CameraSensor:
     max_range_m: float
     min_grazing_deg: float
     errors: Errors
+    calibration: Calibration | None = None
 
     # ---- the two questions of every profile --------------------------------------------------------------
 
@@ -77,10 +68,17 @@ class CameraSensor:
         sight = self.sight(pose, report.gimbal, report.intrinsics)
         outline = report.footprint
         footprint = self._footprint(sight) if outline is None else self._outlined(outline)
+        if self.calibration is not None and (looks := self.calibration.at(report.threshold)) is not None:
+            better, worse = looks[0] / self.detect.p_tp, (1.0 - looks[1]) / (1.0 - self.p_tn)
+            p_tp, p_tn = footprint.p_tp * better, 1.0 - (1.0 - footprint.p_tn) * worse
+            footprint = replace(footprint, p_tp=p_tp, p_tn=p_tn)
         spots = [(spot, seen) for seen in report.detections if (spot := self._spot(sight, seen)) is not None]
-        hits, on_it = self._hits(footprint, [spot for spot, _ in spots])
-        found = [self._sighting(*spots[i]) for i in on_it]
-        return Reading(footprint, hits, tuple(found))
+        looked = footprint.counts
+        hits, on_it = spread_hits(
+            [(spot, self.calibration.ratio(seen.score) if self.calibration else None) for spot, seen in spots],
+            footprint.cells[looked], footprint.p_tp[looked], footprint.p_tn[looked], self.frame.cell_m,
+        )  # fmt: skip
+        return Reading(footprint, hits, tuple(self._sighting(*spots[i]) for i in on_it))
 
     def sight(self, pose: Pose, gimbal: Gimbal | None = None, intrinsics: Intrinsics | None = None) -> Sight:
         """The camera at a pose, turned as the report's gimbal says, else as it is mounted."""
@@ -159,22 +157,6 @@ class CameraSensor:
         c = spot.covariance
         square = (float(c[0, 0]), float(c[0, 1]), float(c[1, 1]))
         return Sighting(float(lat), float(lon), square, seen.thumbnail)
-
-    def _hits(self, footprint: Footprint, spots: list[Spot]) -> tuple[dict[Cell, float], list[int]]:
-        """The likelihood ratio of every cell that a detection may be a hit of, and which spots lie in these."""
-        looked = footprint.counts
-        cells, p_tp, p_tn = footprint.cells[looked], footprint.p_tp[looked], footprint.p_tn[looked]
-        none = np.ones(len(cells))
-        on_it = []
-        for number, spot in enumerate(spots):
-            share, on_footprint = shares(spread(spot, self.frame.cell_m), cells, p_tn)
-            if on_footprint >= _LEAST_ON_FOOTPRINT:
-                none *= 1.0 - share
-                on_it.append(number)
-        share = 1.0 - none
-        ratio = share * p_tp / (1.0 - p_tn) + (1.0 - share) * (1.0 - p_tp) / p_tn
-        hits = {(r, c): float(ratio[i]) for i, (r, c) in enumerate(cells.tolist()) if share[i] > 0.0}
-        return hits, on_it
 
 
 def _attitude(pose: Pose) -> tuple[float, float]:

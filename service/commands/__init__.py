@@ -7,6 +7,7 @@ COMMANDS = {
     "preview": "what a search of an area will be like, before flying",
     "export": "a run as geojson, kml, gpx, geotiff, plan, csv or html",
     "config": "check or show settings",
+    "replay": "show a run that is over on the page",
     "schema": "the JSON Schema of a detector report",
 }
 """Each word with what it does, for the help."""

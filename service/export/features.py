@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,7 +13,7 @@ import shapely
 
 from service.area.prior import cell_squares
 from service.export.gaps import find_gaps, on_earth, oriented
-from service.export.run import Fix, Run
+from service.export.run import Find, Fix, Run
 from service.export.wishes import Wishes
 
 _CORNERS = 48
@@ -107,15 +108,28 @@ def _detections(run: Run) -> Iterable[Item]:
 
 
 def _found(run: Run) -> Iterable[Item]:
-    """The find, and the ellipse that holds the target with 95 % if it is there: a circle of its longest sigma."""
+    """The find, and the ellipse that holds the target with 95 % if it is there."""
     find = run.find
     if find is None:
         return
+    major, minor, bearing = find.ellipse
+    facts = {
+        "semi_major_m": round(major, 1),
+        "semi_minor_m": round(minor, 1),
+        "bearing_deg": round(bearing, 1),
+    }
+    name = "where the target is with 95 %"
+    yield Item("uncertainty", name, on_earth(run.frame, _ellipse(run, find)), facts={"holds": 0.95, **facts})
     facts = {"probability": find.probability, "sigma_m": find.sigma_m}
-    middle = run.frame.to_metres([(find.lat, find.lon)])[0]
-    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
-    radius = find.sigma_m * float(np.sqrt(-2.0 * np.log(0.05)))
-    circle = shapely.Polygon(middle + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1))
-    said = {"holds": 0.95, "radius_m": round(radius, 1)}
-    yield Item("uncertainty", "where the target is with 95 %", on_earth(run.frame, circle), facts=said)
     yield Item("found", "found", _point(find.lat, find.lon), time=find.time, facts=facts)
+
+
+def _ellipse(run: Run, find: Find) -> shapely.Polygon:
+    """In the grid's metres (east, south), whose north is turned from the true one."""
+    major, minor, bearing = find.ellipse
+    turned = math.radians(bearing - run.frame.bearing_deg)
+    along = np.array([math.sin(turned), -math.cos(turned)])
+    across = np.array([math.cos(turned), math.sin(turned)])
+    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)[:, None]
+    middle = run.frame.to_metres([(find.lat, find.lon)])[0]
+    return shapely.Polygon(middle + major * np.cos(turn) * along + minor * np.sin(turn) * across)

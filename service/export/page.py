@@ -18,7 +18,7 @@ from service.export.run import Detection, Run
 from service.export.wishes import Wishes
 
 MOST_ROWS = 100
-SAME_S = 30.0
+SAME_S, LATELY = 30.0, 50
 
 STYLE = """
 body { font: 16px/1.45 system-ui, sans-serif; color: #111; background: #fff; max-width: 60rem; margin: 1rem auto;
@@ -48,6 +48,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
         ),
         "<p>Left: where the target may be now, after everything that was seen and not seen. Right: how probable "
         "it is that the looks so far would have found it there. Both are turned with the grid.</p>",
+        _regions(run),
         "<h2>Where not</h2>",
         *_where_not(run, gaps, wishes),
         "<h2>What was found</h2>",
@@ -78,7 +79,7 @@ def _lead(run: Run) -> str:
         find = run.find
         text = (
             f"<strong>Found</strong> at {find.lat:.6f}, {find.lon:.6f} at {_clock(find.time)} UTC, with a probability "
-            f"of {_sure(find.probability)}. The place is good to about {find.sigma_m:.0f} m (1 sigma)."
+            f"of {_sure(find.probability)}. If it is there, it is within {find.ellipse[0]:.0f} m of that with 95 %."
         )
         return f'<p class="lead found">{text}</p>'
     place = int(run.poa.argmax())
@@ -114,6 +115,26 @@ def _numbers(run: Run) -> str:
         ),
     ]
     return _table(("", ""), rows, head=False)
+
+
+def _regions(run: Run) -> str:
+    """The places that stood out before the search: what they hold now and how well they were searched."""
+    rows = []
+    for number in range(1, int(run.labels.max(initial=0)) + 1):
+        inside = run.labels == number
+        first, now = float(run.grid.prior[inside].sum()), float(run.poa[inside].sum())
+        before = first * (1.0 - run.grid.outside)
+        pod = float((run.grid.prior[inside] * run.pod[inside]).sum() / first) if first > 0.0 else 0.0
+        rows.append((f"ROI {number}", f"{before:.1%}", f"{now:.1%}", f"{pod:.0%}"))
+    if not rows:
+        return "<p>No place stood out before the search: the probability was spread evenly.</p>"
+    heads = (
+        "region of interest",
+        "probability before",
+        "probability now",
+        "POD, weighted by the probability before",
+    )
+    return _table(heads, rows[:MOST_ROWS]) + _more(len(rows))
 
 
 def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
@@ -172,9 +193,10 @@ def sightings(run: Run) -> list[list[Detection]]:
     """Detections that are most likely the same thing, together: one class, within a cell, not long after each other."""
     seen: list[list[Detection]] = []
     for each in run.detections:
-        metres = run.frame.to_metres([(each.lat, each.lon), *((old[-1].lat, old[-1].lon) for old in seen)])
+        lately = seen[-LATELY:]
+        metres = run.frame.to_metres([(each.lat, each.lon), *((old[-1].lat, old[-1].lon) for old in lately)])
         away = np.hypot(*(metres[1:] - metres[0]).T)
-        for old, distance in zip(reversed(seen), reversed(away), strict=True):
+        for old, distance in zip(reversed(lately), reversed(away), strict=True):
             same = (old[-1].kind, old[-1].source) == (each.kind, each.source)
             if same and distance <= run.frame.cell_m and each.time - old[-1].time <= SAME_S:
                 old.append(each)

@@ -118,7 +118,8 @@ def _seconds(run: Run, wishes: Wishes) -> float:
     home = grid.frame.to_metres([grid.launch])[0]
     farthest = float(np.hypot(*(cells - home).T).max())
     most = flight.max_flight_s if wishes.minutes is None else 60.0 * wishes.minutes
-    around = 2.0 * climb_seconds(flight) + 2.0 * leg_seconds(farthest, flight)
+    landing = flight.return_height_m / flight.descent_mps
+    around = climb_seconds(flight) + 2.0 * leg_seconds(farthest, flight) + landing
     if most <= around:
         raise BadInput(
             f"{run.name}: {most / 60:g} minutes are too short: take-off, landing and the longest way there and home "

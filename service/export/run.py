@@ -21,12 +21,15 @@ from service.area import Grid, SearchArea
 from service.area.frame import GridFrame
 from service.config import Settings
 from service.errors import BadInput
+from service.evidence import Observation
 from service.flight import LatLon
 from service.journal import Row, read_meta, read_rows
 from service.resume import retrace, stored_settings
 from service.search import Search
 from service.states import FINAL, Event, State
 from service.survey import AREA, JOURNAL, PRIOR, survey
+from service.suspects import IN_95_PERCENT
+from service.verdict import ROW as VERDICT
 
 BREAK_S = 60.0
 """A track is broken where nothing was heard of the aircraft for so long."""
@@ -58,13 +61,18 @@ class Detection:
 
 @dataclass(frozen=True)
 class Find:
-    """The place at which the search counted its target as found; `sigma_m` metres along the longest axis."""
+    """The place at which the search counted its target as found; `sigma_m` metres along the longest axis.
+
+    `ellipse` holds the target with 95 %: semi-axes in metres, and the bearing of the long one in degrees from true
+    north; a circle of that size for a journal that tells no more than sigma.
+    """
 
     time: float
     lat: float
     lon: float
     probability: float
     sigma_m: float
+    ellipse: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -178,7 +186,10 @@ def read_run(folder: Path) -> Run:
     search = Search(grid, settings)
     curve = []
     for row in rows:
-        retrace(row, search)
+        try:
+            retrace(row, search)
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise BadInput(f"{journal}: row {row.seq} is no {row.kind} that is known ({error})") from error
         if row.kind == "report" and row.body["observation"] is not None:
             curve.append((row.time, search.record.pos))
     reports = [row for row in rows if row.kind == "report"]
@@ -197,7 +208,7 @@ def read_run(folder: Path) -> Run:
         track=_pieces(fix for row in reports for fix in _fix(row)),
         hits=_hits(grid.frame, reports),
         detections=tuple(each for row in reports for each in _detections(row)),
-        find=_find(rows),
+        find=_find(rows, search),
         timeline=tuple(moment for row in rows for moment in _moment(row)) or (_first(rows[0]),),
         autopilot=_autopilot(rows),
         launch_amsl_m=_launch_amsl_m(rows, settings.flight.altitude_m),
@@ -236,22 +247,27 @@ def _pieces(fixes: Iterable[Fix]) -> tuple[tuple[Fix, ...], ...]:
 def _hits(frame: GridFrame, reports: Sequence[Row]) -> tuple[LatLon, ...]:
     cells = []
     for row in reports:
-        observed = row.body["observation"]
-        if observed is not None:
-            cells += [cell for cell, hit in zip(observed["cells"], observed["hits"], strict=True) if hit]
+        if row.body["observation"] is not None:
+            cells += Observation.from_dict(row.body["observation"]).speaking
     return tuple((float(lat), float(lon)) for lat, lon in frame.to_latlon(np.array(cells).reshape(-1, 2)))
 
 
 def _detections(row: Row) -> Iterable[Detection]:
+    """What a report has seen; one that is told in pixels stands where the service placed it, if it did."""
     report: dict[str, Any] = row.body["report"]
     observed = row.body["observation"]
-    for each in report["detections"]:
+    seen = report.get("detections", ())
+    placed = (observed or {}).get("sightings", ())
+    for number, each in enumerate(seen):
+        place = each
         if each.get("lat") is None or each.get("lon") is None:
-            continue  # told in pixels; the hits have its cells
+            if len(placed) != len(seen):
+                continue
+            place = placed[number]
         yield Detection(
             time=_captured(row),
-            lat=float(each["lat"]),
-            lon=float(each["lon"]),
+            lat=float(place["lat"]),
+            lon=float(place["lon"]),
             kind=_plain(each.get("class", "target")),
             score=float(each.get("score", 1.0)),
             source=_plain(report.get("source", "detector")),
@@ -265,13 +281,25 @@ def _plain(text: object) -> str:
     return "".join(c if c.isprintable() else "?" for c in whole)
 
 
-def _find(rows: Sequence[Row]) -> Find | None:
-    """The last place that counted as found."""
-    for row in reversed(rows):
+def _find(rows: Sequence[Row], search: Search) -> Find | None:
+    """The last place that counted as found, unless an operator has rejected it since and it counts no more."""
+    find: Find | None = None
+    rejected = False
+    for row in rows:
+        body = row.body
         if row.kind == "found":
-            body = row.body
-            return Find(row.time, body["lat"], body["lon"], body["probability"], body["sigma_m"])
-    return None
+            radius = body["sigma_m"] * IN_95_PERCENT
+            known = body.get("ellipse") or {}
+            ellipse = (
+                float(known.get("semi_major_m", radius)),
+                float(known.get("semi_minor_m", radius)),
+                float(known.get("bearing_deg", 0.0)),
+            )
+            find = Find(row.time, body["lat"], body["lon"], body["probability"], body["sigma_m"], ellipse)
+            rejected = False
+        elif row.kind == VERDICT:
+            rejected = not body["confirmed"]
+    return None if rejected and search.found() is None else find
 
 
 def _moment(row: Row) -> Iterable[Moment]:
@@ -281,6 +309,8 @@ def _moment(row: Row) -> Iterable[Moment]:
         yield Moment(row.time, "state", f"{body['from']} → {body['to']}: {body['reason']}")
     elif row.kind == "order":
         yield Moment(row.time, "order", f"operator: {body['command']}")
+    elif row.kind == VERDICT:
+        yield Moment(row.time, "verdict", f"operator: {'it is' if body['confirmed'] else 'it is not'} here")
     elif row.kind == "mode" and not body["commanded"]:
         yield Moment(row.time, "mode", f"the autopilot changed to {body['mode']}")
     elif row.kind == "found":

@@ -12,12 +12,14 @@ It listens on loopback unless told otherwise; on any other address it wants bear
 
 from service.http.access import Access, Scope, read_access
 from service.http.address import bind, split_address, url_of
-from service.http.app import Run, create_app
+from service.http.app import create_app
+from service.http.run import PastRun, Run
 from service.http.server import Door, Server, open_door
 
 __all__ = [
     "Access",
     "Door",
+    "PastRun",
     "Run",
     "Scope",
     "Server",

@@ -3,45 +3,40 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import hashlib
 import json
-import re
 import time
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, Literal
 
-from fastapi import Body, FastAPI, Request, Response
+from fastapi import Body, FastAPI, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.models import Example
-from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse
-from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from starlette.middleware.cors import CORSMiddleware
 
 from service.config import HttpSettings
+from service.http import examples
 from service.http.access import Access
+from service.http.docs import describe_api
+from service.http.events import Watchers
 from service.http.guard import Guard, Refusal, client_of, too_many
+from service.http.page import FOLDER, Parts, policy
 from service.http.rate import Buckets
+from service.http.run import PastRun, Run
 from service.intake import JournalLost
 from service.reports import EXAMPLES, Command, Receipt, Report
+from service.underlay import NO_UNDERLAY, Underlay
 
-PAGE = Path(__file__).parents[1] / "page.html"
+At = Annotated[
+    float | None,
+    Query(description="of a replay: the time to look at, seconds since the epoch", allow_inf_nan=False),
+]
+PNG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/png": {}}}}
+
 _MOST_COMPLAINTS = 8
 _MOST_CHARACTERS = 200
-
-
-class Run(Protocol):
-    """What the door shows of a run."""
-
-    registry: CollectorRegistry
-
-    def state(self) -> dict[str, Any]: ...
-    def map(self) -> dict[str, Any]: ...
-    def picture(self) -> bytes: ...
-    def ready(self) -> bool: ...
-    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]: ...
-    async def order(self, command: str, place: tuple[float, float] | None = None) -> str: ...
+_MOST_DECISIONS = 1000
 
 
 def create_app(
@@ -51,14 +46,24 @@ def create_app(
     access: Access | None = None,
     names: Sequence[str] = (),
     any_address: bool = False,
+    underlay: Underlay | None = None,
+    past: PastRun | None = None,
 ) -> FastAPI:
-    """The application for one run, behind its guard; for the arguments see `Guard`."""
+    """The application for one run, behind its guard; for the other arguments see `Guard`.
+
+    Args:
+        underlay: map tiles for the page.
+        past: the run, when it is over and is looked at with `?at=`; `run` is then its end.
+    """
+    underlay = underlay or NO_UNDERLAY
     http, access = http or HttpSettings(), access or Access()
     buckets = Buckets()
     app = FastAPI(
         title="roisearch",
         summary="A search in progress: report frames, read the state, give orders.",
         version="1",
+        docs_url=None,
+        redoc_url=None,
     )
     app.add_middleware(Guard, http=http, access=access, names=names, any_address=any_address, buckets=buckets)
     if http.allowed_origins:
@@ -68,6 +73,10 @@ def create_app(
             allow_methods=["GET", "POST"],
             allow_headers=["authorization", "content-type"],
         )
+
+    def only_live() -> None:
+        if past is not None:
+            raise Refusal(409, "this is a replay: it takes neither reports nor orders")
 
     @app.exception_handler(JournalLost)
     async def journal_lost(_: Request, error: Exception) -> Response:
@@ -83,11 +92,16 @@ def create_app(
         assert isinstance(error, Refusal)
         return error.response(request.scope)
 
-    @app.post("/api/reports", summary="Report what a detector saw in one frame, or in several")
+    @app.post(
+        "/api/reports",
+        summary="Report what a detector saw in one frame, or in several",
+        responses=examples.RECEIPTS,
+    )
     async def reports(
         request: Request,
         body: Annotated[Report | list[Report], Body(openapi_examples=openapi_examples(EXAMPLES))],
     ) -> list[Receipt]:
+        only_live()
         batch = body if isinstance(body, list) else [body]
         if len(batch) > http.max_batch:
             raise Refusal(413, f"a batch has at most {http.max_batch} reports")
@@ -98,22 +112,81 @@ def create_app(
         return await run.submit_all(batch)
 
     @app.post(
-        "/api/commands", summary="Give an order: hold, resume, return or abort; confirm or reject a place"
+        "/api/commands",
+        summary="Give an order: hold, resume, return or abort; confirm or reject a place",
+        responses=examples.ORDERED,
     )
-    async def commands(command: Command) -> dict[str, str]:
+    async def commands(
+        command: Annotated[Command, Body(openapi_examples=examples.COMMANDS)],
+    ) -> dict[str, str]:
+        only_live()
         return {"state": await run.order(command.command, command.place)}
 
-    @app.get("/api/state", summary="Where the search stands, and the footprint of a frame taken now")
-    async def state() -> Response:
-        return JSONResponse(run.state())
+    def then(at: float | None) -> Run:
+        if at is None:
+            return run
+        if past is None:
+            raise Refusal(404, "this run is live, it has no 'at'; a replay has")
+        return past.at(at)
 
-    @app.get("/api/map", summary="The belief and the probability of detection, cell by cell")
-    async def grid_map() -> Response:
-        return JSONResponse(run.map())
+    @app.get(
+        "/api/state",
+        summary="Where the search stands, and the footprint of a frame taken now",
+        responses=examples.STATE,
+    )
+    async def state(at: At = None) -> Response:
+        return JSONResponse(then(at).state())
 
-    @app.get("/api/map.png", summary="The same as a picture")
-    async def picture() -> Response:
-        return Response(await asyncio.to_thread(run.picture), media_type="image/png")
+    @app.get(
+        "/api/map",
+        summary="The belief and the probability of detection, cell by cell, or as GeoJSON",
+        responses=examples.MAP,
+    )
+    async def grid_map(
+        at: At = None,
+        format: Annotated[
+            Literal["cells", "geojson"], Query(description="rows of cells, or RFC 7946")
+        ] = "cells",
+    ) -> Response:
+        if format == "geojson":
+            said = json.dumps(then(at).geojson(), allow_nan=False)
+            return Response(said, media_type="application/geo+json")
+        return JSONResponse(then(at).map())
+
+    @app.get("/api/map.png", summary="The same as a picture", response_class=Response, responses=PNG)
+    async def picture(at: At = None) -> Response:
+        return Response(await asyncio.to_thread(then(at).picture), media_type="image/png")
+
+    @app.get(
+        "/api/decisions",
+        summary="The last decisions with their reasons and options, the newest first",
+        responses=examples.DECISIONS,
+    )
+    async def decisions(
+        at: At = None, count: Annotated[int, Query(ge=1, le=_MOST_DECISIONS)] = 20
+    ) -> list[dict[str, Any]]:
+        return await asyncio.to_thread(then(at).decisions, count)
+
+    @app.get(
+        "/api/replay",
+        summary="From when to when a replay goes; 404 for a live run",
+        responses=examples.REPLAY,
+    )
+    async def replay() -> dict[str, float]:
+        if past is None:
+            raise Refusal(404, "this run is live; 'roisearch-service replay RUN' shows one that is over")
+        first, last = past.span()
+        return {"from": first, "to": last}
+
+    watchers = Watchers(run, {"tiles": underlay.describe(), "replay": past and list(past.span())})
+    app.add_api_websocket_route("/api/events", watchers.serve)
+
+    @app.get("/tiles/{z}/{x}/{y}", include_in_schema=False)
+    async def tile(z: int, x: int, y: int) -> Response:
+        data = await asyncio.to_thread(underlay.tile, z, x, y)
+        if data is None:
+            raise Refusal(404, "there is no such tile")
+        return Response(data, media_type=underlay.kind, headers={"cache-control": "private, max-age=86400"})
 
     @app.get("/healthz", include_in_schema=False)
     async def healthy() -> Response:
@@ -131,9 +204,14 @@ def create_app(
 
     @app.get("/", include_in_schema=False)
     async def page() -> Response:
-        text = PAGE.read_text(encoding="utf-8")
-        return HTMLResponse(text, headers={"content-security-policy": page_policy(text)})
+        headers = {"content-security-policy": policy(underlay.source)}
+        return FileResponse(FOLDER / "index.html", headers=headers)
 
+    @app.get("/docs", include_in_schema=False)
+    async def docs() -> Response:
+        return HTMLResponse(describe_api(app.openapi()), headers={"content-security-policy": policy()})
+
+    app.mount("/page", Parts(directory=FOLDER))
     return app
 
 
@@ -154,26 +232,6 @@ def complaints(error: RequestValidationError) -> list[dict[str, Any]]:
         }
         for found in error.errors()[:_MOST_COMPLAINTS]
     ]
-
-
-def page_policy(page: str) -> str:
-    """A Content-Security-Policy that lets the page run its own scripts and nobody else's (CSP level 3)."""
-    hashes = [
-        "'sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() + "'"
-        for script in re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
-    ]
-    return "; ".join(
-        (
-            "default-src 'none'",
-            "script-src 'self' " + " ".join(hashes),
-            "style-src 'self' 'unsafe-inline'",
-            "img-src 'self' blob: data:",
-            "connect-src 'self'",
-            "frame-ancestors 'none'",
-            "base-uri 'none'",
-            "form-action 'none'",
-        )
-    )
 
 
 def _printable(text: object) -> str:

@@ -7,6 +7,7 @@ no Content-Length to check.
 from __future__ import annotations
 
 import asyncio
+import base64
 import contextlib
 import math
 import time
@@ -25,8 +26,15 @@ from service.http.address import LOOPBACK_NAMES, host_name
 from service.http.rate import Buckets
 
 READS = frozenset({"GET", "HEAD", "OPTIONS"})
-OPEN_PATHS = frozenset({"/", "/healthz"})
-"""Readable without a token: the page, which asks for one and holds nothing itself, and the sign of life."""
+OPEN_PATHS = frozenset({"/", "/docs", "/healthz"})
+"""Readable without a token: the page, which asks for one and holds nothing itself, what the API is like, and the
+sign of life."""
+ASSETS = "/page/"
+"""What the page is made of; as open as the page."""
+SUBPROTOCOL = "roisearch"
+TOKEN_PROTOCOL = "bearer."
+"""A browser cannot set the headers of a WebSocket, and a URL ends up in logs and histories: the token comes as one
+more subprotocol, base64url after this word. It is never chosen, so it is not sent back."""
 REPORT_ROUTES = frozenset({("POST", "/api/reports"), ("GET", "/api/state"), ("HEAD", "/api/state")})
 """What a report token opens."""
 
@@ -50,7 +58,7 @@ class Refusal(Exception):
     def response(self, request: Request) -> JSONResponse:
         """What to answer; the connection ends where a body may still be coming, which nobody will read."""
         headers = dict(_HEADERS)
-        if request["method"] not in READS:
+        if request.get("method", "GET") not in READS:
             headers["connection"] = "close"
         if self.status == 401:
             headers["www-authenticate"] = "Bearer"
@@ -90,8 +98,11 @@ class Guard:
         self._now = now
 
     async def __call__(self, scope: Request, receive: Receive, send: Send) -> None:
+        if scope["type"] == "websocket":
+            await self._websocket(scope, receive, send)
+            return
         if scope["type"] != "http":
-            raise RuntimeError(f"the door speaks HTTP only, not {scope['type']}")
+            raise RuntimeError(f"the door speaks HTTP and WebSocket, not {scope['type']}")
         headers, incoming = Headers(scope=scope), _Incoming(receive)
         try:
             self._check_host(scope, headers)
@@ -114,6 +125,20 @@ class Guard:
 
         await self._app(scope, receive if body is None else _replay(body, receive), send_safely)
 
+    async def _websocket(self, scope: Request, receive: Receive, send: Send) -> None:
+        """A WebSocket passes the same checks before it is accepted (RFC 6455, 10.2: it has no same-origin policy)."""
+        headers = Headers(scope=scope)
+        try:
+            self._check_host(scope, headers)
+            self._check_origin(scope, headers)
+            self._check_token(scope, headers)
+            self._check_rate(scope)
+        except Refusal as refusal:
+            await receive()
+            await refusal.response(scope)(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
     def _check_host(self, request: Request, headers: Headers) -> None:
         given = headers.getlist("host")
         name = host_name(given[0]) if len(given) == 1 else None
@@ -125,7 +150,9 @@ class Guard:
 
     def _check_origin(self, request: Request, headers: Headers) -> None:
         """A page of another site may neither command nor report (RFC 6454; the Fetch standard's metadata)."""
-        reads = request["method"] in READS
+        reads = (
+            request.get("method", "") in READS
+        )  # a WebSocket is opened from anywhere: as strict as a write
         origins = headers.getlist("origin")
         if len(origins) == 1 and origins[0].lower() in self._origins:
             return
@@ -142,10 +169,13 @@ class Guard:
             )
 
     def _check_token(self, request: Request, headers: Headers) -> None:
-        route = (request["method"], request["path"])
-        if not self._access.needed or (route[0] in READS and route[1] in OPEN_PATHS):
+        route = (request.get("method", "GET"), request["path"])
+        is_open = route[1] in OPEN_PATHS or route[1].startswith(ASSETS)
+        if not self._access.needed or (route[0] in READS and is_open):
             return
         given = headers.getlist("authorization")
+        if request["type"] == "websocket":
+            given += _offered_tokens(headers)
         scope = self._access.scope_of(given[0]) if len(given) == 1 else None
         if scope is None:
             raise Refusal(401, "a bearer token is needed")
@@ -153,11 +183,12 @@ class Guard:
             raise Refusal(403, f"a {scope.value} token does not open this; a command token does")
 
     def _check_rate(self, request: Request) -> None:
-        """Reports, reading the state, commands and other reading each have a bucket of their own."""
-        reads, path = request["method"] in READS, request["path"]
+        """Reports, reading the state, the page's parts and tiles, commands and other reading each have a bucket."""
+        reads, path = request.get("method", "GET") in READS, request["path"]
         frequent = path in ("/api/reports", "/api/state")
-        per_s = self._http.reports_per_s if frequent else self._http.commands_per_s
-        wait = self._buckets.take((client_of(request), reads, frequent), per_s, self._now())
+        small = path.startswith((ASSETS, "/tiles/"))
+        per_s = self._http.reports_per_s if frequent or small else self._http.commands_per_s
+        wait = self._buckets.take((client_of(request), reads, frequent, small), per_s, self._now())
         if wait:
             raise too_many(per_s, wait)
 
@@ -214,6 +245,21 @@ class _Incoming:
 
 def _announces_body(headers: Headers) -> bool:
     return headers.get("content-length", "0") not in ("", "0") or "transfer-encoding" in headers
+
+
+def _offered_tokens(headers: Headers) -> list[str]:
+    """The tokens among the subprotocols that a WebSocket offers, as Authorization headers have them."""
+    offered = [name.strip() for line in headers.getlist("sec-websocket-protocol") for name in line.split(",")]
+    tokens = []
+    for name in offered:
+        if name.startswith(TOKEN_PROTOCOL):
+            coded = name[len(TOKEN_PROTOCOL) :]
+            try:
+                token = base64.urlsafe_b64decode(coded + "=" * (-len(coded) % 4)).decode("ascii")
+            except (ValueError, UnicodeDecodeError):
+                token = ""
+            tokens.append(f"Bearer {token}")
+    return tokens
 
 
 def client_of(request: Request) -> str:

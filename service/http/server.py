@@ -13,15 +13,18 @@ import uvicorn
 from fastapi import FastAPI
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from service.config import HttpSettings
+from service.config import HttpSettings, PageSettings
 from service.http.access import Access, read_access
 from service.http.address import bind, bound_address, split_address, url_of
-from service.http.app import Run, create_app
+from service.http.app import create_app
+from service.http.run import PastRun, Run
+from service.underlay import NO_UNDERLAY, Underlay, open_underlay
 
 _MOST_CONNECTIONS = 256
 _MOST_HEADER_BYTES = 16_384
 _KEEP_ALIVE_S = 15
 _SHUTDOWN_S = 2
+_PING_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,7 @@ class Door:
     http: HttpSettings
     listener: socket.socket
     access: Access
+    underlay: Underlay = NO_UNDERLAY
 
     @property
     def url(self) -> str:
@@ -42,8 +46,8 @@ class Door:
         access, token = self.access.with_guest()
         return replace(self, access=access), token
 
-    def server(self, run: Run) -> Server:
-        """A server of a run at this door."""
+    def server(self, run: Run, past: PastRun | None = None) -> Server:
+        """A server of a run at this door; for `past` see `create_app`."""
         address = bound_address(self.listener)
         name = split_address(self.http.listen)[0]
         app = create_app(
@@ -52,6 +56,8 @@ class Door:
             access=self.access,
             names=() if address.is_unspecified else (name if ":" not in name else f"[{name}]", f"{address}"),
             any_address=address.is_unspecified,
+            underlay=self.underlay,
+            past=past,
         )
         return Server(app, self.listener, self.http)
 
@@ -60,19 +66,21 @@ class Door:
         self.listener.close()
 
 
-def open_door(http: HttpSettings, environment: Mapping[str, str]) -> Door:
+def open_door(http: HttpSettings, environment: Mapping[str, str], page: PageSettings | None = None) -> Door:
     """Take the address and read the tokens, before anything else starts.
 
     Raises:
-        BadInput: the address is not one or is taken, or a token is missing, unreadable or weak.
+        BadInput: the address is not one or is taken, a token is missing, unreadable or weak, or there are no
+            such map tiles.
     """
+    underlay = open_underlay(page or PageSettings())
     listener = bind(*split_address(http.listen))
     try:
         access = read_access(http, environment, loopback=bound_address(listener).is_loopback)
     except BaseException:
         listener.close()
         raise
-    return Door(http, listener, access)
+    return Door(http, listener, access, underlay)
 
 
 class Impatient(H11Protocol):
@@ -114,7 +122,10 @@ class Server(uvicorn.Server):
         config = uvicorn.Config(
             app,
             http=type("Impatient", (Impatient,), {"patience_s": patience_s}),
-            ws="none",
+            ws="websockets-sansio",
+            ws_max_size=_MOST_HEADER_BYTES,  # all that a watcher ever says is a time to look at
+            ws_ping_interval=_PING_S,
+            ws_ping_timeout=_PING_S,
             lifespan="off",
             log_level="warning",
             access_log=False,  # a path may hold anything that somebody pasted into it

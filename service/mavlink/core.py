@@ -48,6 +48,7 @@ from service.mavlink.events import (
 )
 from service.mavlink.framing import Codec, Message, Receiver, own_heartbeat
 from service.mavlink.history import PoseHistory
+from service.mavlink.quality import LinkQuality
 from service.mavlink.readiness import Readiness
 from service.mavlink.settings import LinkSettings
 from service.mavlink.signing import Signer
@@ -82,6 +83,7 @@ class LinkCore:
         """Why the last autopilot heard was not paired with, as a sentence's end."""
         self.bytes_received = 0
         self.messages_received = 0
+        self.quality = LinkQuality()
         self._speaks_first = speaks_first
         signer = Signer(settings.signing_key) if settings.signing_key is not None else None
         self.codec = Codec(settings.system_id or _BEFORE_PAIRING_SYSTEM, settings.component_id, signer)
@@ -283,6 +285,7 @@ class LinkCore:
                 return  # somebody else speaks in the vehicle's name while it is still heard
             self.destination = source
         self._heard_at = now
+        self.quality.note(message.get_seq())
         if self._boot.read(message):
             self._rebooted(now)
         self._streams.on_message(message.get_msgId(), now)

@@ -113,6 +113,11 @@ class Vehicle:
         return self._core.telemetry
 
     @property
+    def received(self) -> float | None:
+        """The part of the autopilot's last messages that arrived, 0 to 1; None before there were any."""
+        return self._core.quality.received
+
+    @property
     def history(self) -> PoseHistory:
         """Where it has been."""
         return self._core.history

@@ -54,6 +54,7 @@ class Link:
     def send(self, message: Any) -> None:
         """Put one message in the outbox."""
         self._post(message.pack(self._codec))
+        self._codec.seq = (self._codec.seq + 1) % 256  # so that the other side can tell what was lost
 
     def send_as(self, message: Any, system: int, component: int) -> None:
         """Put a message of somebody else on the same wire in the outbox."""

@@ -8,9 +8,12 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import httpx
+import numpy as np
+from numpy.typing import NDArray
 from prometheus_client import CollectorRegistry
 
 from service.config import HttpSettings
+from service.feed import Moment
 from service.http import Access, Door, Server, create_app, open_door, read_access
 from service.reports import Receipt, Report
 
@@ -33,8 +36,26 @@ class FakeRun:
     def map(self) -> dict[str, Any]:
         return {"probability": []}
 
+    def geojson(self) -> dict[str, Any]:
+        return {"type": "FeatureCollection", "features": []}
+
     def picture(self) -> bytes:
         return b"\x89PNG"
+
+    def decisions(self, count: int) -> list[dict[str, Any]]:
+        return [{"reason": "because"}][:count]
+
+    def scene(self) -> dict[str, Any]:
+        return {"area": "field"}
+
+    def searchable(self) -> NDArray[np.bool_]:
+        return np.ones((1, 2), dtype=bool)
+
+    def moment(self) -> Moment:
+        return Moment(self.state(), np.array([0.25, 0.75]), 1.0, np.zeros((1, 2)), [], [], [])
+
+    async def moment_at(self, at: float) -> Moment:
+        return self.moment()
 
     def ready(self) -> bool:
         return True
@@ -74,9 +95,15 @@ def in_memory(
 
 
 @asynccontextmanager
-async def on_a_socket(run: FakeRun, *, any_address: bool = False, **values: Any) -> AsyncIterator[Door]:
+async def on_a_socket(
+    run: FakeRun,
+    *,
+    any_address: bool = False,
+    token_environment: dict[str, str] | None = None,
+    **values: Any,
+) -> AsyncIterator[Door]:
     """The real server, on a real socket; with `any_address` it takes that for one of many that it listens on."""
-    door = open_door(settings(**values), {})
+    door = open_door(settings(**values), token_environment or {})
     server = door.server(run)
     if any_address:
         server = Server(create_app(run, http=door.http, any_address=True), door.listener)

@@ -11,12 +11,13 @@ import numpy as np
 
 from service.area import Grid
 from service.config import Settings
-from service.evidence import Observation
+from service.evidence import Observation, Sighting
 from service.journal import Journal
 from service.survey import AREA, JOURNAL, survey
 from tests.service.area_files import at, box, collection, feature, point, polygon, ring
 
 BEGAN = 1767225600.0
+ELLIPSE = {"semi_major_m": 40.0, "semi_minor_m": 10.0, "bearing_deg": 70.0}
 EVIL = "=cmd|' /C calc'!A0 <script>alert(1)</script> \ud800\x07"
 SETTINGS = Settings.model_validate({"sensor": {"cell_m": 20.0}, "flight": {"altitude_m": 25.0}})
 
@@ -62,12 +63,19 @@ class Recorder:
             self.write("transition", **{"from": before, "event": event, "to": after, "reason": reason})
         self.write("command", command="reposition", lat=47.0, lon=11.0, alt_amsl_m=525.0)
 
-    def look(self, cell: tuple[int, int], *, hit: bool = False, detections: tuple[Any, ...] = ()) -> None:
+    def look(
+        self,
+        cell: tuple[int, int],
+        *,
+        hit: bool = False,
+        detections: tuple[Any, ...] = (),
+        sightings: tuple[Sighting, ...] = (),
+    ) -> None:
         """One frame over the middle of a cell, with one look at it."""
         lat, lon = self.grid.frame.to_latlon([cell])[0].tolist()
         self.frames += 1
         looked = Observation(
-            np.array([cell]), np.array([hit]), np.array([0.9]), np.array([0.9]), np.array([True])
+            np.array([cell]), np.array([hit]), np.array([0.9]), np.array([0.9]), np.array([True]), sightings
         )
         report = {
             "id": str(self.frames),
@@ -91,7 +99,7 @@ class Recorder:
         state = "SEARCHING"
         if found:
             lat, lon = at(200, 40)[::-1]
-            self.write("found", lat=lat, lon=lon, probability=0.9994, sigma_m=6.5)
+            self.write("found", lat=lat, lon=lon, probability=0.9994, sigma_m=6.5, ellipse=ELLIPSE)
             said = {"event": "confirmed", "to": "FOUND", "reason": "found"}
             self.write("transition", **{"from": state, **said})
             state = "FOUND"
@@ -109,7 +117,7 @@ def record(folder: Path, *, found: bool = False, part: float = 0.5) -> Path:
     cells = list(recorder.cells())
     lon, lat = at(150, 60)
     seen = (
-        {"class": "person", "score": 0.7, "lat": lat, "lon": lon},
+        {"class": "=person", "score": 0.7, "lat": lat, "lon": lon},
         {"class": "person", "box": [1, 2, 3, 4]},
     )
     for number, cell in enumerate(cells[: round(part * len(cells))]):

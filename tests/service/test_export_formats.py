@@ -19,6 +19,7 @@ import gpxpy
 import html5lib
 import numpy as np
 import pyogrio.raw
+import pyproj
 import pytest
 import rasterio
 import rasterio.warp
@@ -38,6 +39,7 @@ from sim.autopilot.process import AutopilotProcess
 from tests.service.export_run import EVIL, record
 
 WISHES = Wishes()
+GEOD = pyproj.Geod(ellps="WGS84")
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +83,11 @@ def test_geojson_is_read_by_gdal_with_everything_in_its_place(found: Run, tmp_pa
     (place,) = shapes[role == "found"]
     assert (place.y, place.x) == pytest.approx((found.find.lat, found.find.lon), abs=1e-7)
     (ellipse,) = shapes[role == "uncertainty"]
-    assert ellipse.contains(place)
+    lon, lat = shapely.get_coordinates(ellipse).T
+    azimuth, _, far = GEOD.inv(np.full_like(lon, place.x), np.full_like(lat, place.y), lon, lat)
+    assert (far.max(), far.min()) == pytest.approx((40.0, 10.0), abs=0.1)
+    assert azimuth[far.argmax()] % 180.0 == pytest.approx(70.0, abs=0.5)
+    assert azimuth[far.argmin()] % 180.0 == pytest.approx(160.0, abs=0.5)
     (track,) = shapes[role == "track"]
     assert shapely.get_coordinates(track, include_z=True)[0] == pytest.approx(
         [found.track[0][0].lon, found.track[0][0].lat, 25.0], abs=1e-6

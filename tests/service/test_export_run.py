@@ -13,12 +13,13 @@ import pytest
 
 from roisearch import Belief
 from service.errors import BadInput
-from service.evidence import Observation
+from service.evidence import Observation, Sighting
 from service.export.gaps import find_gaps, gap_cells
 from service.export.run import read_run
 from service.export.wishes import Wishes
 from service.journal import read_rows
 from service.survey import AREA, JOURNAL
+from service.verdict import verdict_on, verdict_row
 from tests.service.export_run import BEGAN, SETTINGS, Recorder, record
 
 
@@ -53,6 +54,38 @@ def test_a_track_is_broken_where_a_run_was_resumed(tmp_path: Path) -> None:
     run = read_run(tmp_path)
     assert [len(piece) for piece in run.track] == [4, 5]
     assert not run.over
+
+
+def test_a_find_that_an_operator_has_rejected_is_none(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path)
+    recorder.start()
+    cell = list(recorder.cells())[20]
+    recorder.look(cell, hit=True)
+    lat, lon = recorder.grid.frame.to_latlon([cell])[0].tolist()
+    recorder.write("found", lat=lat, lon=lon, probability=0.9995, sigma_m=6.0)
+    find = read_run(tmp_path).find
+    assert find is not None
+    assert find.ellipse == pytest.approx((6.0 * 2.4477, 6.0 * 2.4477, 0.0), abs=1e-3)
+    before = read_run(tmp_path).poa[cell]
+    said = verdict_on(cell, recorder.grid.frame.shape, 0.99, confirmed=False)
+    recorder.write("verdict", **verdict_row(cell, said, confirmed=False))
+    recorder.journal.close()
+    run = read_run(tmp_path)
+    assert run.find is None
+    assert run.poa[cell] < 0.2 * before
+    assert run.timeline[-1].text == "operator: it is not here"
+
+
+def test_a_detection_told_in_pixels_stands_where_the_service_placed_it(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path)
+    recorder.start()
+    cell = next(recorder.cells())
+    lat, lon = recorder.grid.frame.to_latlon([cell])[0].tolist()
+    placed = Sighting(lat, lon, (9.0, 0.0, 9.0))
+    recorder.look(cell, hit=True, detections=({"class": "person", "box": [1, 2, 3, 4]},), sightings=(placed,))
+    recorder.journal.close()
+    (seen,) = read_run(tmp_path).detections
+    assert (seen.kind, seen.lat, seen.lon, seen.counted) == ("person", lat, lon, True)
 
 
 def test_reading_a_live_run_again_and_again_does_not_disturb_its_writer(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_a_command_needs_the_command_token(token: str | None, status: int) -> No
         ("GET", "/api/map", 403),
         ("GET", "/api/map.png", 403),
         ("GET", "/metrics", 403),
-        ("GET", "/docs", 403),
+        ("GET", "/docs", 200),
         ("GET", "/openapi.json", 403),
         ("GET", "/readyz", 403),
         ("DELETE", "/api/reports", 403),
@@ -112,7 +112,7 @@ def test_a_report_token_opens_reports_and_the_state_and_nothing_else(
     assert ask("POST", "/api/reports", json=FRAME, headers=bearer(REPORT), access=TOKENS).status_code == 200
 
 
-def test_only_the_page_and_the_sign_of_life_are_open_without_a_token() -> None:
+def test_only_the_page_the_description_and_the_sign_of_life_are_open_without_a_token() -> None:
     open_paths = {
         path
         for path in (
@@ -121,13 +121,16 @@ def test_only_the_page_and_the_sign_of_life_are_open_without_a_token() -> None:
             "/readyz",
             "/metrics",
             "/docs",
+            "/page/main.js",
             "/openapi.json",
+            "/tiles/1/0/0",
+            "/api/decisions",
             "/api/state",
             "/api/map",
         )
         if ask("GET", path, access=TOKENS).status_code == 200
     }
-    assert open_paths == {"/", "/healthz"}
+    assert open_paths == {"/", "/docs", "/page/main.js", "/healthz"}
     assert ask("POST", "/", json={}, access=TOKENS).status_code == 401
 
 

@@ -114,7 +114,9 @@ def test_a_preview_says_what_is_to_be_expected(field: tuple[SearchArea, Grid]) -
     assert any("compiling" in name for name in said)
     assert any("false alarms" in name for name in said)
     assert [goal.pos for goal in seen.goals] == [0.5, 0.75, 0.95]
-    assert seen.battery_s == pytest.approx(0.8 * 12.0 * 60.0)
+    assert seen.kept_percent is not None
+    assert seen.kept_percent == pytest.approx(15.0 + 100.0 * seen.home.seconds / 720.0)
+    assert seen.battery_s == pytest.approx(720.0 * (1.0 - seen.kept_percent / 100.0))
     assert sum(region.mass for region in seen.regions) <= 0.9 + 1e-9
     first = seen.goals[0]
     assert first.median_s is not None
@@ -125,9 +127,12 @@ def test_a_preview_says_what_is_to_be_expected(field: tuple[SearchArea, Grid]) -
     assert "cannot be reached" in words["POS 95%"]  # a tenth of the probability is outside
     assert f"{seen.grid.frame.rows} x {seen.grid.frame.cols} cells of 20 m" in words["grid"]
     assert "ROI 1" in words
-    assert "the reserve of 20 % flies 2:24" in words["way home"]
-    short = dict(facts(preview(*field, SETTINGS, 3.0, lambda name, part: None)))
-    assert "THE RESERVE IS TOO SMALL" in short["way home"]
+    assert f"{seen.kept_percent:.0f} % of the battery are kept" in words["way home"]
+
+
+def test_a_battery_that_is_too_small_is_refused(field: tuple[SearchArea, Grid]) -> None:
+    with pytest.raises(BadInput, match="2 minutes is too small"):
+        preview(*field, SETTINGS, 2.0, lambda name, part: None)
 
 
 def test_the_command_prints_it_and_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,13 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from roisearch import Belief
+from roisearch import Belief, FieldOfView
 from service.area import GridFrame
+from service.calibration import Calibration
 from service.camera import Errors, Flat, Pinhole, Sight, Spot, locate_pixel, rotation, sight_from, spread
 from service.camera.locate import shares
 from service.camera.sensor import CameraSensor, Mount
 from service.config import Settings
-from service.evidence import Pose, Unreadable, observe
+from service.evidence import Pose, Sensor, Unreadable, observe
 from service.passes import Passes
 from service.reports import Report
 from service.sensors import camera_sensor, cell_size, field_of_view
@@ -221,3 +222,29 @@ def test_hovering_gives_another_look_only_after_the_time_that_was_set() -> None:
             o = observe(passes, "camera", frame / 10.0, SENSOR.read(pose(15, 15), report()))
             count += 0 if o is None else [14, 15] in o.cells.tolist()
         assert count == looks
+
+
+def test_an_accuracy_spreads_a_detection_in_every_profile() -> None:
+    point = Sensor(FRAME, FieldOfView.from_mask(np.ones((3, 3))), 0.9, 0.9, 0.2, 0.8, 60.0)
+    lat, lon = FRAME.to_latlon([[15.0, 15.5]])[0]  # between two cells
+    spread_out = point.read(pose(15, 15), report({"lat": lat, "lon": lon, "accuracy_m": 3.0})).hits
+    assert spread_out[15, 15] == pytest.approx(spread_out[15, 16], rel=0.03)
+    assert spread_out[15, 15] == pytest.approx(0.5 * 9.0 + 0.5 / 9.0, rel=0.03)
+    without = point.read(pose(15, 15), report({"lat": lat, "lon": lon})).hits
+    assert list(without.values()) == [pytest.approx(9.0)]
+
+
+def test_a_score_has_the_likelihood_ratio_of_the_calibration() -> None:
+    calibrated = CameraSensor(
+        **{**vars(SENSOR), "calibration": Calibration((0.2, 0.8), (0.0, math.log(50.0)))}
+    )
+    footprint = SENSOR.footprint(pose(15, 15))
+    row, col = footprint.cells[footprint.counts][0].tolist()
+    lat, lon = FRAME.to_latlon([[row, col]])[0]
+    seen = {"lat": lat, "lon": lon, "accuracy_m": 0.5, "score": 0.8}
+    assert calibrated.read(pose(15, 15), report(seen)).hits == {(row, col): pytest.approx(50.0)}
+    roc = Calibration((0.2,), (math.log(4.0),), (0.2, 0.9), ((0.8, 0.8), (0.45, 0.99)))
+    calibrated = CameraSensor(**{**vars(SENSOR), "calibration": roc})
+    strict = calibrated.read(pose(15, 15), report(threshold=0.9)).footprint
+    assert strict.p_tp == pytest.approx(0.5 * footprint.p_tp)
+    assert 1.0 - strict.p_tn == pytest.approx(0.1 * (1.0 - footprint.p_tn))

@@ -1,0 +1,112 @@
+// Layers of cells: a small canvas that the browser stretches and turns over the grid, and the colours on it.
+
+const L = window.L;
+
+/** A canvas over the grid with `scale` pixels a cell. */
+export const Cells = L.Layer.extend({
+  initialize(frame, scale, label) {
+    this.frame = frame;
+    this.scale = scale;
+    this.canvas = L.DomUtil.create("canvas", "cells leaflet-zoom-animated");
+    this.canvas.width = frame.cols * scale;
+    this.canvas.height = frame.rows * scale;
+    this.canvas.setAttribute("role", "img");
+    this.canvas.setAttribute("aria-label", label);
+    this.context = this.canvas.getContext("2d");
+    this.image = this.context.createImageData(this.canvas.width, this.canvas.height);
+    this.pixels = new Uint32Array(this.image.data.buffer);
+  },
+  onAdd() {
+    this.getPane().appendChild(this.canvas);
+    this.place();
+  },
+  onRemove() {
+    this.canvas.remove();
+  },
+  getEvents() {
+    return { viewreset: this.place, zoom: this.place, zoomanim: this.animate };
+  },
+  place() {
+    this.turn(this.frame.corners.map((corner) => this._map.latLngToLayerPoint(corner)));
+  },
+  animate(event) {
+    this.turn(this.frame.corners.map((corner) => this._map._latLngToNewLayerPoint(L.latLng(corner), event.zoom, event.center)));
+  },
+  turn([nw, ne, , sw]) {
+    const { width, height } = this.canvas;
+    const across = ne.subtract(nw).divideBy(width), down = sw.subtract(nw).divideBy(height);
+    this.canvas.style.transform = `matrix(${across.x},${across.y},${down.x},${down.y},${nw.x},${nw.y})`;
+  },
+  /** Paint every cell with the colour (as a little-endian ABGR number) of its code; `inset` pixels stay free around. */
+  paint(codes, colours, inset = 0) {
+    const { rows, cols } = this.frame, s = this.scale, width = cols * s;
+    if (s === 1) codes.forEach((code, i) => (this.pixels[i] = colours[code]));
+    else
+      for (let row = 0, i = 0; row < rows; row++)
+        for (let col = 0; col < cols; col++, i++) {
+          const colour = colours[codes[i]];
+          for (let y = inset; y < s - inset; y++) {
+            const start = (row * s + y) * width + col * s;
+            this.pixels.fill(colour, start + inset, start + s - inset);
+          }
+        }
+    this.context.putImageData(this.image, 0, 0);
+  },
+});
+
+const HEAT = [[255, 247, 188], [254, 217, 118], [253, 160, 60], [240, 84, 30], [189, 17, 40], [98, 8, 66]];
+const DECADES = 3;
+
+/** The colour of a place on the scale: pale for long, so that what stands out does. */
+function mix(stops, part) {
+  const at = Math.min(1, Math.max(0, part)) ** 1.4 * (stops.length - 1);
+  const low = Math.min(stops.length - 2, Math.floor(at));
+  return stops[low].map((value, i) => value + (stops[low + 1][i] - value) * (at - low));
+}
+
+const packed = ([r, g, b], alpha) => ((Math.round(255 * alpha) << 24) | (Math.round(b) << 16) | (Math.round(g) << 8) | Math.round(r)) >>> 0;
+
+const heatAlpha = (part) => 0.15 + 0.72 * Math.min(1, part * 1.25);
+
+/** The largest probability on the scale: the peak, rounded up to 1, 2 or 5, so that colours do not flicker. */
+export function topOf(run) {
+  const peak = run.probability(run.codes.reduce((most, code) => Math.max(most, code), 0));
+  const decade = 10 ** Math.floor(Math.log10(peak || 1));
+  return Math.min(1, [1, 2, 5, 10].map((each) => each * decade).find((each) => each >= peak * 0.999) ?? 1);
+}
+
+/** A colour for each code of the belief: logarithmic, three decades down from `top`. */
+export function heatColours(run, top) {
+  const colours = new Uint32Array(256);
+  for (let code = 1; code < 256; code++) {
+    const part = 1 + Math.log10(run.probability(code) / top) / DECADES;
+    colours[code] = part <= 0 ? 0 : packed(mix(HEAT, part), heatAlpha(part));
+  }
+  return colours;
+}
+
+const LOOKED = [0, 92, 110];
+
+/** A colour for each POD: the surer, the more of it. */
+export function podColours() {
+  return Uint32Array.from({ length: 256 }, (_, code) => (code ? packed(LOOKED, 0.12 + 0.6 * (code / 255)) : 0));
+}
+
+function ramp(canvas, colour) {
+  canvas.width = 200;
+  canvas.height = 1;
+  const context = canvas.getContext("2d"), image = context.createImageData(200, 1);
+  new Uint32Array(image.data.buffer).forEach((_, i, pixels) => (pixels[i] = colour(i / 199)));
+  context.putImageData(image, 0, 0);
+}
+
+export const heatRamp = (canvas) => ramp(canvas, (part) => packed(mix(HEAT, part), heatAlpha(part)));
+export const podRamp = (canvas) => ramp(canvas, (part) => (part ? packed(LOOKED, 0.12 + 0.6 * part) : 0));
+
+/** A probability for people: two digits, as a percentage. */
+export function percent(part) {
+  if (part >= 0.0995) return (100 * part).toFixed(0) + " %";
+  return part > 0 ? Number((100 * part).toPrecision(1)) + " %" : "0 %";
+}
+
+export const heatTicks = (top) => [3, 2, 1, 0].map((decades) => percent(top / 10 ** decades));

@@ -1,0 +1,111 @@
+// Orders: what moves the aircraft is asked twice, except to stop, which must not wait.
+
+import { ask, order } from "./link.js";
+import { $, make, say } from "./panel.js";
+import { percent } from "./cells.js";
+
+const FLYING = ["SEARCHING", "CONFIRMING"];
+const MAY = {
+  hold: [...FLYING, "RETURNING"],
+  resume: ["HOLDING", "YIELDED"],
+  return: [...FLYING, "TAKEOFF", "HOLDING", "YIELDED"],
+};
+const QUESTIONS = {
+  resume: ["Resume the search?", "The aircraft leaves its place and flies on with the search.", "Resume"],
+  return: ["Return to launch?", "The search ends; the aircraft flies home and lands.", "Return"],
+  confirm: ["Confirm the target?", "This is what was looked for: the search ends and the aircraft flies home.", "Confirm"],
+  reject: ["Reject this detection?", "The map is lowered there, and the search goes on elsewhere. It cannot be taken back.", "Reject"],
+};
+
+let clearing;
+export function tell(text) {
+  clearTimeout(clearing);
+  say($("toast"), text);
+  clearing = setTimeout(() => say($("toast"), ""), 5000);
+}
+
+function sure(command) {
+  const [title, text, yes] = QUESTIONS[command], dialog = $("ask");
+  $("ask-title").textContent = title;
+  $("ask-text").textContent = text;
+  $("ask-yes").textContent = yes;
+  dialog.returnValue = "no";
+  dialog.showModal();
+  $("ask-no").focus();
+  return new Promise((settle) => dialog.addEventListener("close", () => settle(dialog.returnValue === "yes"), { once: true }));
+}
+
+export async function give(command, place = {}) {
+  if (QUESTIONS[command] && !(await sure(command))) return;
+  try {
+    const { state } = await order({ command, ...place });
+    tell(`${command}: ${state}`);
+  } catch (error) {
+    tell(`${command} failed: ${error.message}`);
+  }
+}
+
+export function showOrders(state, mayOrder) {
+  for (const button of $("orders").children) {
+    const usable = mayOrder && (MAY[button.dataset.command] ?? []).includes(state);
+    if (button.disabled === usable) button.disabled = !usable;
+  }
+}
+
+for (const button of $("orders").children) button.addEventListener("click", () => give(button.dataset.command));
+
+const key = ({ lat, lon }) => `${lat.toFixed(6)}, ${lon.toFixed(6)}`;
+
+/** The detections that a person should judge; their list is rebuilt only when they are other ones. */
+export function showSuspects(state, mayOrder, onShow) {
+  const suspects = state.suspects ?? [], list = $("suspects"), card = $("suspects-card");
+  card.hidden = !suspects.length && !state.found;
+  say($("suspects-title"), state.found ? "Found" : "Detections");
+  const wanted = JSON.stringify([suspects.map((each) => [key(each), !!each.thumbnail]), state.found, mayOrder]);
+  if (list.dataset.shown !== wanted) {
+    list.dataset.shown = wanted;
+    list.replaceChildren(...(state.found ? [foundItem(state.found)] : suspects.map((each) => suspectItem(each, mayOrder, onShow))));
+  }
+  if (state.found) return;
+  suspects.forEach((each, i) => {
+    const hits = Array.isArray(each.hits) ? each.hits.length : each.hits;
+    say(list.children[i].querySelector(".sure"), `${percent(each.probability)} sure${hits ? `, ${hits} ${hits === 1 ? "hit" : "hits"}` : ""}`);
+  });
+}
+
+function foundItem(found) {
+  const where = found.ellipse ? `, within ${Math.round(found.ellipse.semi_major_m)} m by ${Math.round(found.ellipse.semi_minor_m)} m` : "";
+  return make("li", {}, make("strong", { textContent: key(found) }), make("span", { className: "where", textContent: `${(100 * found.probability).toFixed(1)} % sure${where}` }));
+}
+
+function suspectItem(each, mayOrder, onShow) {
+  const item = make("li", {});
+  if (each.thumbnail) item.append(picture(each.thumbnail));
+  item.append(make("strong", { className: "sure" }), make("span", { className: "where", textContent: key(each) }));
+  const show = make("button", { type: "button", textContent: "Show" });
+  show.addEventListener("click", () => onShow(each));
+  const buttons = [show];
+  if (mayOrder) {
+    const confirm = make("button", { type: "button", textContent: "Confirm", className: "go" });
+    confirm.addEventListener("click", () => give("confirm", { lat: each.lat, lon: each.lon }));
+    const reject = make("button", { type: "button", textContent: "Reject" });
+    reject.addEventListener("click", () => give("reject", { lat: each.lat, lon: each.lon }));
+    buttons.push(confirm, reject);
+  }
+  item.append(make("div", { className: "verdict" }, ...buttons));
+  return item;
+}
+
+/** What the detector gave as a picture: the image itself, or an address elsewhere, which only a click asks. */
+function picture(thumbnail) {
+  if (/^https?:/.test(thumbnail))
+    return make("a", { href: thumbnail, target: "_blank", rel: "noreferrer", textContent: "Picture" });
+  const image = make("img", { alt: "what the camera saw" });
+  if (thumbnail.startsWith("data:image/")) image.src = thumbnail;
+  else if (thumbnail.startsWith("/"))
+    ask(thumbnail)
+      .then(async (answer) => (image.src = URL.createObjectURL(await answer.blob())))
+      .catch(() => image.remove());
+  else return "";
+  return image;
+}

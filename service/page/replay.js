@@ -1,0 +1,51 @@
+// The time slider of a run that is over.
+
+import { $, lasting, say } from "./panel.js";
+
+const SPEED = 20; // seconds of the run a second
+const TICK_MS = 250;
+
+export class Replay {
+  constructor([first, last], show) {
+    Object.assign(this, { first, last, show, playing: null });
+    const slider = $("time");
+    Object.assign(slider, { min: 0, max: Math.ceil(last - first), step: 1, value: Math.ceil(last - first) });
+    slider.addEventListener("input", () => this.go(Number(slider.value)));
+    $("play").addEventListener("click", () => (this.playing ? this.stop() : this.play()));
+    $("replay").hidden = false;
+  }
+
+  go(seconds) {
+    this.show(this.first + seconds);
+  }
+
+  play() {
+    const slider = $("time");
+    if (Number(slider.value) >= Number(slider.max)) slider.value = 0;
+    let at = Number(slider.value);
+    this.playing = setInterval(() => {
+      at = Math.min(Number(slider.max), at + (SPEED * TICK_MS) / 1000);
+      slider.value = at;
+      this.go(at);
+      if (at >= Number(slider.max)) this.stop();
+    }, TICK_MS);
+    this.button("Pause", true);
+  }
+
+  stop() {
+    clearInterval(this.playing);
+    this.playing = null;
+    this.button("Play", false);
+  }
+
+  button(text, pressed) {
+    say($("play"), text);
+    $("play").setAttribute("aria-pressed", pressed);
+  }
+
+  shown(time) {
+    const text = `${lasting(Math.max(0, time - this.first))} of ${lasting(this.last - this.first)}`;
+    say($("clock"), text);
+    $("time").setAttribute("aria-valuetext", text);
+  }
+}

@@ -1,0 +1,282 @@
+"""The live page in a real browser, beside a search that really flies against the mock autopilot.
+
+One search for all: the tests are in the order in which it can be looked at.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, WebSocket, expect
+
+from .stage import PATIENCE_MS, Stage, Watch, searching
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def craft(page: Page) -> str:
+    """Where the page shows the aircraft."""
+    transform: str = page.locator(".craft").evaluate("(element) => element.style.transform")
+    return transform
+
+
+def test_the_page_shows_a_search_that_is_running(watch: Watch, stage: Stage) -> None:
+    page = watch.page
+    searching(watch)
+    expect(page.locator("#area")).to_have_text("Rannoch Moor")
+    expect(page.locator(".roi span")).to_have_count(4)
+    expect(page.locator(".roi span").first).to_contain_text("%")
+    expect(page.locator("#goals")).to_contain_text("to 50 %")
+    expect(page.locator("#reason")).to_contain_text("of the mass")
+    assert page.locator("#options tbody tr").count() >= 2
+    expect(page.locator("#facts")).to_contain_text("% received")
+    assert watch.painted("Heat layer") >= 250  # of 315 cells
+    before = craft(page)
+    page.wait_for_function(
+        "(before) => document.querySelector('.craft').style.transform !== before", arg=before
+    )
+    page.wait_for_function("() => parseFloat(document.getElementById('pos').textContent) > 0")
+    assert watch.painted("probability of detection") > 0
+    assert abs(float(page.locator("#pos").inner_text().split()[0]) - 100 * stage.state()["pos"]) < 5.0
+    expect(page.locator(".leaflet-control-scale-line")).to_contain_text("m")
+
+
+def test_nothing_is_asked_of_anybody_but_the_service(watch: Watch, stage: Stage) -> None:
+    searching(watch)
+    watch.page.wait_for_function(
+        "() => document.querySelectorAll('.leaflet-tile-loaded').length > 0"
+    )  # MBTiles
+    assert {url.split("/")[2] for url in watch.asked if not url.startswith("blob:")} == {
+        f"127.0.0.1:{stage.port}"
+    }
+
+
+def test_moments_come_over_one_websocket_and_are_small(watch: Watch) -> None:
+    page = watch.page
+    searching(watch)
+    opened: list[WebSocket] = []
+    frames: list[str | bytes] = []
+
+    def note(socket: WebSocket) -> None:
+        opened.append(socket)
+        socket.on("framereceived", lambda frame: frames.append(frame))
+
+    page.on("websocket", note)
+    page.reload()
+    searching(watch)
+    asked = len(watch.asked)
+    while len(frames) < 12:
+        page.wait_for_timeout(50)
+    assert len(opened) == 1
+    assert [url for url in watch.asked[asked:] if "/tiles/" not in url and not url.startswith("blob:")] == []
+    moments = [json.loads(frame) for frame in frames[2:]]
+    assert all(moment["type"] == "moment" for moment in moments)
+    cells = 15 * 21
+    assert all(len(moment["belief"].get("codes", "")) < cells for moment in moments)
+
+
+def test_reload_keeps_the_view(watch: Watch) -> None:
+    page = watch.page
+    searching(watch)
+    page.get_by_label("how well it was looked at").uncheck()
+    page.get_by_role("button", name="Zoom in").click()
+    page.locator("#map").focus()
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_timeout(600)
+    kept = "Object.entries(localStorage).find(([key]) => key.startsWith('view of'))[1]"
+    before = json.loads(page.evaluate(kept))
+    page.reload()
+    searching(watch)
+    expect(page.get_by_label("how well it was looked at")).not_to_be_checked()
+    expect(page.get_by_label("where the target may be")).to_be_checked()
+    page.get_by_label("track flown").uncheck()  # writes the view down again
+    after = json.loads(page.evaluate(kept))
+    assert before["zoom"] == after["zoom"]
+    assert before["centre"] == pytest.approx(
+        after["centre"], abs=4e-5
+    )  # a few pixels: the header has grown since
+    assert page.locator("canvas.cells").count() == 1
+
+
+def at_rest(stage: Stage) -> bool:
+    """Wait until the aircraft stands still; what it really does, not what it says."""
+    deadline = time.monotonic() + PATIENCE_MS / 1000
+    while stage.control.state()["speed"] > 0.3:
+        assert time.monotonic() < deadline, stage.control.state()
+        time.sleep(0.05)
+    return True
+
+
+def test_hold_stops_the_aircraft_and_resume_asks_first(watch: Watch, stage: Stage) -> None:
+    page = watch.page
+    searching(watch)
+    watch.order("Hold").click()
+    watch.shows("HOLDING")
+    expect(page.locator("#toast")).to_have_text("hold: HOLDING")
+    assert at_rest(stage)
+    stands = stage.control.state()
+    expect(watch.order("Hold")).to_be_disabled()
+    watch.order("Resume").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog).to_contain_text("Resume the search?")
+    dialog.get_by_role("button", name="Cancel").click()
+    expect(dialog).to_be_hidden()
+    assert stage.state()["state"] == "HOLDING"
+    now = stage.control.state()
+    assert abs(now["north"] - stands["north"]) + abs(now["east"] - stands["east"]) < 2.0
+    watch.order("Resume").click()
+    dialog.get_by_role("button", name="Resume").click()
+    searching(watch)
+    deadline = time.monotonic() + PATIENCE_MS / 1000
+    while stage.control.state()["speed"] < 1.0:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def focused(page: Page) -> str:
+    """What has the keyboard."""
+    text: str = page.evaluate("document.activeElement.textContent.trim() || document.activeElement.id")
+    return text
+
+
+def test_a_keyboard_is_enough(watch: Watch, stage: Stage) -> None:
+    page = watch.page
+    searching(watch)
+    page.keyboard.press("Tab")
+    assert focused(page) == "Hold"  # the first stop: the way to stop must be short
+    page.keyboard.press("Enter")
+    watch.shows("HOLDING")
+    for _ in range(10):
+        page.keyboard.press("Tab")
+        if focused(page) == "Resume":
+            break
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("dialog")).to_be_visible()
+    assert focused(page) == "Cancel"
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    assert focused(page) == "Resume"
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    searching(watch)
+    reached = set()
+    for _ in range(25):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("document.activeElement.id"))
+    assert {"map", "layer-belief", "layer-pod", "layer-tiles"} <= reached
+
+
+def test_no_serious_finding_of_axe(watch: Watch, stage: Stage) -> None:
+    searching(watch)
+    assert watch.violations() == []
+    watch.order("Return").click()
+    expect(watch.page.get_by_role("dialog")).to_be_visible()
+    assert watch.violations() == []
+    watch.page.keyboard.press("Escape")
+    watch.page.goto(stage.url + "/docs")
+    expect(watch.page.get_by_text("POST /api/reports")).to_be_visible()
+    assert watch.violations() == []
+
+
+def test_a_phone_shows_everything_that_matters(chromium: Browser, stage: Stage) -> None:
+    phone = Watch(
+        chromium, stage.url, viewport={"width": 390, "height": 844}, device_scale_factor=2, has_touch=True
+    )
+    page = phone.page
+    searching(phone)
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    for name in ("Hold", "Resume", "Return"):
+        box = phone.order(name).bounding_box()
+        assert box is not None
+        assert box["height"] >= 44
+        assert box["y"] + box["height"] < 844
+    box = page.locator("#map").bounding_box()
+    assert box is not None
+    assert box["height"] > 300
+    assert box["y"] + box["height"] < 844
+    page.mouse.wheel(0, 3000)
+    expect(phone.order("Hold")).to_be_in_viewport()  # wherever one has scrolled to
+    assert phone.violations() == []
+    phone.order("Hold").tap()
+    phone.shows("HOLDING")
+    phone.order("Resume").tap()
+    page.get_by_role("dialog").get_by_role("button", name="Resume").tap()
+    searching(phone)
+    phone.close()
+
+
+def test_the_readmes_pictures(watch: Watch, chromium: Browser, stage: Stage, pictures: Path | None) -> None:
+    """Made when ROISEARCH_PICTURES names a folder; the sizes are looked at always."""
+    page = watch.page
+    searching(watch)
+    if pictures is not None:
+        page.wait_for_function(
+            "() => parseFloat(document.getElementById('pos').textContent) > 38", timeout=240_000
+        )
+    wide = page.screenshot()
+    phone = Watch(chromium, stage.url, viewport={"width": 390, "height": 844}, device_scale_factor=2)
+    searching(phone)
+    phone.page.wait_for_function("() => document.getElementById('goals').textContent.includes('50')")
+    narrow = phone.page.screenshot()
+    phone.close()
+    for name, picture in (("page.png", wide), ("page-phone.png", narrow)):
+        assert picture.startswith(b"\x89PNG")
+        assert len(picture) > 20_000  # something is on it
+        if pictures is not None:
+            (pictures / name).write_bytes(picture)
+
+
+def test_a_restart_of_the_service_is_survived(chromium: Browser, stage: Stage) -> None:
+    watch = Watch(chromium, stage.url)
+    page = watch.page
+    searching(watch)
+    page.get_by_label("detector hits").uncheck()
+    page.evaluate("window.same = true")
+    stage.service.process.kill()
+    expect(page.locator("#lost")).to_contain_text("No connection")
+    expect(watch.order("Hold")).to_be_disabled()
+    pos = page.locator("#pos").inner_text()
+    watch.complaints.clear()
+    stage.start_again()
+    watch.shows("SEARCHING", "CONFIRMING")
+    expect(page.locator("#lost")).to_be_hidden()
+    assert page.evaluate("window.same"), "the page was not loaded again"
+    assert float(page.locator("#pos").inner_text().split()[0]) >= float(pos.split()[0]) - 0.2
+    expect(page.get_by_label("detector hits")).not_to_be_checked()
+    expect(watch.order("Hold")).to_be_enabled()
+    refused = "ERR_CONNECTION_REFUSED"  # what Chromium itself says while nobody listens
+    assert [said for said in watch.complaints if refused not in said] == []
+    watch.context.close()
+
+
+def test_programs_get_the_same_over_a_socket(stage: Stage) -> None:
+    door = stage.door
+    shapes = door.get("/api/map", params={"format": "geojson"}).json()
+    roles = [each["properties"]["role"] for each in shapes["features"]]
+    assert roles.count("cell") == 315
+    assert {"search", "exclude", "launch", "region", "cell", "track"} <= set(roles)
+    mass = sum(
+        each["properties"].get("probability", 0)
+        for each in shapes["features"]
+        if each["properties"]["role"] == "cell"
+    )
+    assert mass + shapes["outside"] == pytest.approx(1.0)
+    decisions: list[dict[str, Any]] = door.get("/api/decisions", params={"count": 5}).json()
+    assert len(decisions) == 5
+    assert any(option["chosen"] for option in decisions[0]["options"])
+    told = door.get("/metrics").text
+    for name in (
+        "roisearch_step_seconds_bucket",
+        "roisearch_hit_to_waypoint_seconds_bucket",
+        "roisearch_reports_accepted",
+        "roisearch_belief_entropy_bits",
+        "roisearch_link_quality",
+    ):
+        assert name in told
+    assert door.get("/readyz").text == "ready\n"
+    assert door.get("/api/map.png").content.startswith(b"\x89PNG")

@@ -106,7 +106,7 @@ def test_the_judge_lets_a_search_be() -> None:
     assert wire.goes(130.0, 20.0) == []
 
 
-@pytest.mark.parametrize("state", ["READY", "FOUND", "YIELDED", "DONE"])
+@pytest.mark.parametrize("state", ["READY", "TAKEOFF", "YIELDED", "DONE"])
 def test_the_judge_sees_motion_in_a_state_that_may_not_move(state: str) -> None:
     wire = Wire()
     wire.state(state)

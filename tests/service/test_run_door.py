@@ -16,13 +16,17 @@ from service.config import Settings
 from service.journal import Journal
 from service.run import Service
 from service.search import Search
+from service.sensors import make_sensor
 from tests.integration.flight import FIELD
 
 
 def test_a_door_that_does_not_open_is_told_before_the_flight(tmp_path: Path) -> None:
     settings = Settings.model_validate({"sensor": {"cell_m": 20.0}})
     area = parse_area(json.dumps(FIELD).encode(), source="field")
-    service = Service(area, Search(build_grid(area, 20.0), settings), settings, tmp_path, Console())
+    search = Search(build_grid(area, 20.0), settings)
+    service = Service(
+        area, search, make_sensor(settings, search.grid, search.fov), settings, tmp_path, Console()
+    )
 
     async def shut() -> None:
         raise OSError("the door is jammed")

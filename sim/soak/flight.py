@@ -171,8 +171,7 @@ class Flight:
 
     def _kill(self) -> None:
         """kill -9 and --resume: what was told before must still hold, and what was acknowledged be there."""
-        self._service.process.kill()
-        self._service.process.wait()
+        self._service.stop()
         self._look_away()
         self.outcome.said += self._service.said
         if not self._alive_runs():

@@ -285,6 +285,10 @@ def _grown(eyes: Eyes) -> list[str]:
         )
         if end - middle > max(_GROWTH_MB, _GROWTH_PART * middle):
             found.append(f"memory has grown from {middle:.0f} to {end:.0f} MB")
-    if eyes.tasks and max(eyes.tasks) > _MOST_TASKS:
+    if eyes.memory_mb and not max(eyes.tasks, default=0):
+        found.append("the number of tasks is not told")
+    if max(eyes.tasks, default=0) > _MOST_TASKS:
         found.append(f"{max(eyes.tasks)} tasks at a time")
+    if third >= 10 and eyes.tasks and min(eyes.tasks[-third:]) > max(eyes.tasks[third:-third]):
+        found.append(f"tasks have grown from {max(eyes.tasks[third:-third])} to {min(eyes.tasks[-third:])}")
     return found

@@ -3,8 +3,10 @@ after each, and everything watched."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
+import subprocess
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -235,9 +237,14 @@ class Flight:
         try:
             httpx.post(f"{self._url}/api/commands", json={"command": command}, timeout=40.0)
         except httpx.HTTPError as error:
+            self._wait_for_the_end(5.0)  # an order that comes when the run ends finds the door shut
             if self._service.process.poll() is None:
                 raise Trouble(f"the order '{command}' was not taken: {error}") from error
         self.judge.ordered(time.monotonic())
+
+    def _wait_for_the_end(self, patience_s: float) -> None:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._service.process.wait(patience_s)
 
     def _pass(self, seconds: float) -> None:
         """Let so much vehicle time pass, or the flight end."""

@@ -363,6 +363,7 @@ class Mission:
             for point in self.helm.route(self.helm.home())[:-1]:
                 if not await self._fly_to(point):
                     return
+        self.helm.rest()  # from here the autopilot steers: it need not come nearer to a waypoint of ours
         await self._command(self.vehicle.return_to_launch(), "return to launch")
         while self.state == State.RETURNING:
             if not self.vehicle.telemetry.armed:

@@ -26,7 +26,7 @@ def stand_still(scene: Scene) -> int:
 
 def test_after_a_stall_nothing_is_sent_on_what_was_known_before(tmp_path: Path) -> None:
     """What waits in the socket is as old as the stall: with nothing newer on the link, nothing may be sent."""
-    with flight(tmp_path, "ardupilot", speedup=3.0, module=STALLING) as scene:
+    with flight(tmp_path, "ardupilot", speedup=5.0, module=STALLING) as scene:
         scene.searching()
         motions = stand_still(scene)
         time.sleep(0.6 * STALL_S)
@@ -37,7 +37,7 @@ def test_after_a_stall_nothing_is_sent_on_what_was_known_before(tmp_path: Path) 
 
 
 def test_a_pilot_who_took_over_during_a_stall_has_the_aircraft(tmp_path: Path) -> None:
-    with flight(tmp_path, "px4", speedup=3.0, module=STALLING) as scene:
+    with flight(tmp_path, "px4", speedup=5.0, module=STALLING) as scene:
         scene.searching()
         motions = stand_still(scene)
         time.sleep(0.4 * STALL_S)

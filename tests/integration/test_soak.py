@@ -27,7 +27,7 @@ PX4_HOLD, PX4_POSCTL = 4 << 16 | 3 << 24, 3 << 16
 
 
 def test_a_short_soak_ends_without_a_violation() -> None:
-    words = ["soak", "--flights", "2", "--seed", "1", "--faults", "5", "--jobs", "2"]
+    words = ["soak", "--flights", "2", "--seed", "1", "--faults", "4", "--jobs", "2"]
     done = subprocess.run(
         [sys.executable, "-m", "sim", *words, "--verbose"], cwd=REPOSITORY, capture_output=True, text=True
     )

@@ -189,6 +189,11 @@ class Service:
         serving = asyncio.create_task(server.run_until_told())
         listening = asyncio.create_task(doors.serve(self.view.submit_all))
         try:
+            while not server.started:  # a door that cannot be opened is said now, not after the flight
+                if serving.done():
+                    serving.result()
+                    raise RuntimeError("the door has closed before it was open")
+                await asyncio.sleep(0.01)
             connect = await self._start_world()
             link = self._link_settings(signing_key)
             async with Vehicle.open(connect, clock=self.clock, settings=link) as vehicle:
@@ -306,6 +311,9 @@ class Service:
             await mission.leave(str(group.exceptions[0]))
         except* asyncio.CancelledError:
             await mission.leave("stopped by a signal", stop=False)
+        except* Exception as group:  # a mistake of ours: the aircraft does not fly on into it
+            await mission.leave(f"internal error, {group.exceptions[0]!r}")
+            raise
         finally:
             display.cancel()
             watch.cancel()

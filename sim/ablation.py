@@ -1,11 +1,11 @@
 """`roisearch-sim ablation`: what each part of the sweep planner is worth, by the exact detection curve.
 
 Every variant flies the same held-out priors from the paper's start, planning at every step; only a path
-that was given without thinking is flown to its end before the next plan. E[T] is restricted to the cap of
-40 000 steps and set against what the prior allows: the release bound with a point field of view, the
-multi-cell bound with another one. With false alarms it is set against the teleporting reference
-(`roisearch.bounds`), and both sides are averaged over the same number of draws, seeded alike. The results
-are kept in the folder: the same command goes on where it stopped.
+that was given without thinking is flown to its end before the next plan, when no false alarm can end it.
+E[T] is restricted to the cap of 40 000 steps and set against what the prior allows: the release bound with
+a point field of view, the multi-cell bound with another one. With false alarms it is set against the
+teleporting reference (`roisearch.bounds`), and both sides are averaged over the same number of draws,
+seeded alike. The results are kept in the folder: the same command goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def fly(variant: str, seed: int, draw: int, options: argparse.Namespace) -> Row:
     deadline = None if options.deadline_ms is None else options.deadline_ms / 1000.0
     curve = detection_curve(
         planner, prior, PAPER_START, P_TP, PAPER_STEPS, np.random.default_rng((seed, draw)), options.p_tn, fov,
-        deadline_s=deadline, stop_below=options.stop_below, follow=variant not in PLANNERS,
+        deadline_s=deadline, stop_below=options.stop_below, follow=variant not in PLANNERS and options.p_tn == 1.0,
     )  # fmt: skip
     first, others = planner.milliseconds()
     numbers = [expected_time(curve), reference_time(prior, fov, options.p_tn, (seed, draw))]

@@ -7,6 +7,7 @@ import sys
 
 COMMANDS: dict[str, tuple[str, str]] = {
     # command: (module with main(arguments) -> exit code, one line of help)
+    "ablation": ("sim.ablation", "what each part of the default planner is worth, above the bound"),
     "autopilot": ("sim.autopilot.cli", "a mock PX4 or ArduPilot on a real socket"),
     "bench": (
         "sim.bench",

@@ -25,7 +25,7 @@ def test_a_door_that_does_not_open_is_told_before_the_flight(tmp_path: Path) -> 
     area = parse_area(json.dumps(FIELD).encode(), source="field")
     search = Search(build_grid(area, 20.0), settings)
     service = Service(
-        area, search, make_sensor(settings, search.grid, search.fov), settings, tmp_path, Console()
+        area, search, make_sensor(settings, search.grid), settings, tmp_path, Console()
     )
 
     async def shut() -> None:

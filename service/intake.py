@@ -30,7 +30,11 @@ from service.verdict import ROW as VERDICT
 from service.verdict import verdict_on, verdict_row
 
 PoseAt = Callable[[float], Pose | None]
-PIECE = 64  # reports in one transaction: a hit behind a large batch does not wait for all of it
+PIECE, PIECE_S = (
+    64,
+    0.01,
+)  # most reports in one transaction, and most seconds to work out what they mean: a hit
+# behind a large batch does not wait for all of it, nor does the flight for a camera's geometry
 MOST_WAITING = 20_000
 MOST_IDS = 200_000  # what is older than these, the journal itself knows
 AHEAD_S = 0.5  # how far in the future of the service's clock a frame may be: as far as a pose is carried on
@@ -70,7 +74,8 @@ class _Batch:
 class Intake:
     """Where reports go in. `pose_at` looks a capture time up in the telemetry, `time_of_boot` translates the
     autopilot's time since boot; `told` is called after each applied observation with the time (perf_counter) at
-    which its report arrived. `history_s` is how far back the telemetry remembers."""
+    which its report arrived, `believed` after each report with the seconds that it took. `history_s` is how far back
+    the telemetry remembers."""
 
     search: Search
     sensor: Profile
@@ -79,6 +84,7 @@ class Intake:
     pose_at: PoseAt
     told: Callable[[Observation, float], None]
     time_of_boot: Callable[[float], float | None] = lambda boot_s: None
+    believed: Callable[[float], None] = lambda seconds: None
     history_s: float = 120.0
     passes: Passes = field(default_factory=Passes)
     accepted: int = 0
@@ -167,7 +173,12 @@ class Intake:
         new: dict[str, tuple[_Waiting, Observation | None]] = {}
         rows: list[tuple[float, str, str, str]] = []
         repeated: list[_Waiting] = []
-        for each in piece:
+        enough = time.perf_counter() + PIECE_S
+        for number, each in enumerate(piece):
+            if time.perf_counter() > enough:
+                self._waiting += piece[number:]
+                del piece[number:]
+                break
             report = each.report
             if report.id in self._ids or report.id in new:
                 repeated.append(each)
@@ -206,6 +217,7 @@ class Intake:
             self.search.apply(observation)
             self.told(observation, each.arrived)
             looks, hits = len(observation.cells), int(observation.hits.sum())
+        self.believed(time.perf_counter() - each.arrived)
         each.settle(Receipt(id=each.report.id, status="accepted", looks=looks, hits=hits))
 
     # ---- when and where
@@ -215,6 +227,8 @@ class Intake:
         now = self.clock.now()
         for each in waiting:
             report, captured = each.report, each.captured
+            if report.id in self._ids:
+                continue
             if len(self._waiting) >= MOST_WAITING:
                 self._refuse(
                     each, f"{MOST_WAITING} reports are waiting already; send it again, and more slowly"
@@ -227,8 +241,6 @@ class Intake:
                     self._refuse(each, f"captured_at {captured:.3f} s since boot {why}")
                     continue
                 captured = each.captured = found
-            if report.id in self._ids:
-                continue
             if captured < now - self.history_s:
                 self._refuse(
                     each,

@@ -1,10 +1,10 @@
 """One look per cell per pass: what frames of the same ground, seconds apart, are worth together.
 
 Neighbouring frames agree with each other, right or wrong, so a video of a cell is one look and not thirty a second.
-A *pass* over a cell begins with the first frame that covers it well enough for a look (or that has a hit in it), and
-goes on while the frames of its source show the cell at all; a frame of that source that does not show it ends the
-pass. So do `again_s` seconds, if frames so far apart are to be looks of their own: what one gains by hovering over a
-suspect (`sensor.hover_look_s`). Several sources that watch a cell at the same time share its pass: it goes on while
+A *pass* over a cell goes on while the frames of its source show the cell at all; a frame of that source that does not
+show it ends the pass. So do `again_s` seconds, if frames so far apart are to be looks of their own: what one gains by
+hovering over a suspect (`sensor.hover_look_s`). A pass becomes a look with the first frame that covers the cell well
+enough, or that has a hit in it. Several sources that watch a cell at the same time share its pass: it goes on while
 any of them shows the cell.
 
 A pass is worth its best frame: a hit replaces a miss, a surer hit a weaker one, a miss from a better place a miss
@@ -143,9 +143,7 @@ class Passes:
         """One cell of one frame."""
         one = self._going_on(cell, time)
         if one is None:
-            if not look.counts and look.ratio is None:
-                return None
-            one = self._begin(known, time, cell)
+            one = self._begin(known, time, cell)  # worth nothing yet
         one.first, one.last = min(one.first, time), max(one.last, time)
         if not known.times or time >= known.times[-1]:
             self._keep_open(source, known, cell, one)

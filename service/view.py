@@ -54,6 +54,12 @@ class RunView(BaseView):
         self.thinking = Histogram(
             "roisearch_step_seconds", "What a decision took", registry=self.registry, buckets=QUICK
         )
+        self.believed = Histogram(
+            "roisearch_report_to_belief_seconds",
+            "From the arrival of a report to its evidence in the journal and the belief",
+            registry=self.registry,
+            buckets=(0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.075, 0.1, 0.2, 0.5, 1.0),
+        )
         for name, about, value in (
             ("roisearch_pos", "Probability of success so far", lambda: search.record.pos),
             ("roisearch_belief_entropy_bits", "Entropy of the belief", search.belief.entropy),

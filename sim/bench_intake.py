@@ -1,10 +1,10 @@
 """`roisearch-sim bench intake`: how many detector reports a searching service takes in, and how long each takes.
 
 A real service process flies the built-in mock and plans; this process sends it reports of frames below the aircraft at
-every door at once: HTTP in batches, lines over UDP and over a Unix socket. A report's time runs from when it was due to
-be sent until its receipt is here, and a receipt comes when the report is on disk and in the belief; so it is more than
-the time from arrival to belief. Then every door is driven as fast as it goes, and compared with one report per HTTP
-request on the same machine at the same time.
+every door at once: HTTP in batches, lines over UDP and over a Unix socket. How long a report takes from its arrival to
+the belief, the service tells in /metrics. The times in the table are more than that: from when a report was due to be
+sent until its receipt is here, which comes when it is on disk and in the belief. Then every door is driven as fast as
+it goes, and compared with one report per HTTP request.
 
 Lost is a report without a receipt that says so, or that the journal does not hold exactly once.
 """
@@ -35,6 +35,7 @@ import numpy as np
 
 Report = dict[str, Any]
 RATE_AT_LEAST, P99_AT_MOST_MS = 500.0, 50.0
+COUNTED = ("roisearch_report_to_belief_seconds", "roisearch_hit_to_waypoint_seconds")
 HIT_SHARE = 0.01
 BATCH = 20
 WINDOW = 64  # reports on their way at once when a door is driven as fast as it goes
@@ -84,6 +85,7 @@ class Camera:
         self._address, self._rng = address, random.Random(seed)
         self._count = itertools.count()
         self._state: dict[str, Any] = {}
+        self._gone = ""
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._follow, daemon=True)
 
@@ -92,8 +94,8 @@ class Camera:
         self._thread.start()
         deadline = time.monotonic() + patience_s
         while self._state.get("state") not in ("SEARCHING", "CONFIRMING"):
-            if time.monotonic() > deadline:
-                raise RuntimeError(f"the service does not search: {self._state.get('state')}")
+            if self._gone or time.monotonic() > deadline:
+                raise RuntimeError(f"the service does not search: {self._gone or self._state.get('state')}")
             time.sleep(0.1)
 
     def stop(self) -> None:
@@ -125,8 +127,12 @@ class Camera:
     def _follow(self) -> None:
         connection = http.client.HTTPConnection(self._address, timeout=30)
         while not self._ended.wait(0.1):
-            connection.request("GET", "/api/state")
-            state = json.loads(connection.getresponse().read())
+            try:
+                connection.request("GET", "/api/state")
+                state = json.loads(connection.getresponse().read())
+            except (OSError, http.client.HTTPException) as error:
+                self._gone = str(error)
+                return
             if state["pose"] is not None:
                 self._state = state
 
@@ -254,6 +260,14 @@ class Service:
         sock.connect(self.unix)
         return Lines(sock)
 
+    def counted(self, name: str) -> dict[float, float]:
+        """What the service counts in /metrics: events that took up to so many seconds."""
+        connection = http.client.HTTPConnection(self.address, timeout=30)
+        connection.request("GET", "/metrics")
+        text = connection.getresponse().read().decode()
+        found = re.findall(rf'^{name}_bucket\{{le="([^"]+)"\}} (\S+)', text, re.MULTILINE)
+        return {float(limit): float(count) for limit, count in found}
+
     def rows(self, kind: str) -> list[dict[str, Any]]:
         """The journal's rows of a kind."""
         (journal,) = self.runs.glob("*/journal.sqlite")
@@ -344,6 +358,14 @@ def each_flat_out(service: Service, camera: Camera, seconds: float) -> list[Tall
     return tallies
 
 
+def p99_limit_ms(before: dict[float, float], after: dict[float, float]) -> float:
+    """The smallest limit, in milliseconds, below which 99 of 100 events between two counts stayed; NaN: no events."""
+    counts = {limit: after[limit] - before[limit] for limit in after}
+    if not counts[float("inf")]:
+        return float("nan")
+    return min(1e3 * limit for limit, count in counts.items() if count >= 0.99 * counts[float("inf")])
+
+
 def lost(tallies: Sequence[Tally], written: Sequence[str]) -> int:
     """Reports without a good receipt, or that the journal does not hold exactly once."""
     times: dict[str, int] = {}
@@ -370,8 +392,11 @@ def main(arguments: list[str]) -> int:
     ):
         camera = Camera(service.address, options.seed)
         camera.start(patience_s=180.0)
-        decided = len(service.rows("decision"))
+        decided, before = len(service.rows("decision")), [service.counted(name) for name in COUNTED]
         steady = all_at_once(service, camera, options.rate, options.seconds)
+        p99_ms, waypoint_ms = (
+            p99_limit_ms(first, service.counted(name)) for first, name in zip(before, COUNTED, strict=True)
+        )
         decided = len(service.rows("decision")) - decided
         searching = camera.searching
         flat_out = each_flat_out(service, camera, options.flat_out)
@@ -389,6 +414,8 @@ def main(arguments: list[str]) -> int:
         ratio = f"{tally.rate / plain:.1f}" if tally in flat_out else ""
         times = f"{tally.percentile_ms(50):7.1f} {tally.percentile_ms(99):7.1f}"
         print(f"{tally.door:38} {tally.sent:6d} {tally.rate:9.0f} {times}  {ratio}")
+    print(f"all doors at once, by the service's own clock: from arrival to belief p99 below {p99_ms:g} ms,")
+    print(f"from a hit's report to the next waypoint p99 below {waypoint_ms:g} ms")
     print(f"decisions meanwhile: {decided}; still searching at the end: {'yes' if searching else 'no'}")
     print(f"lost: {gone}")
     for tally in [*steady, *flat_out]:
@@ -396,7 +423,7 @@ def main(arguments: list[str]) -> int:
             print(f"  {tally.door}: {receipt['status']} {receipt['reason']}")
     targets = [
         (f"at least {RATE_AT_LEAST:.0f} reports a second", whole.rate >= RATE_AT_LEAST),
-        (f"p99 at most {P99_AT_MOST_MS:.0f} ms", whole.percentile_ms(99) <= P99_AT_MOST_MS),
+        (f"p99 from arrival to belief at most {P99_AT_MOST_MS:.0f} ms", p99_ms <= P99_AT_MOST_MS),
         ("nothing lost", gone == 0),
         ("planning all the while", searching and decided > 0),
     ]

@@ -95,12 +95,13 @@ def create_app(
     @app.post(
         "/api/reports",
         summary="Report what a detector saw in one frame, or in several",
+        response_model=list[Receipt],
         responses=examples.RECEIPTS,
     )
     async def reports(
         request: Request,
         body: Annotated[Report | list[Report], Body(openapi_examples=openapi_examples(EXAMPLES))],
-    ) -> list[Receipt]:
+    ) -> Response:
         only_live()
         batch = body if isinstance(body, list) else [body]
         if len(batch) > http.max_batch:
@@ -109,7 +110,7 @@ def create_app(
         wait = buckets.take(who, http.reports_per_s, time.monotonic(), len(batch))
         if wait:
             raise too_many(http.reports_per_s, wait)
-        return await run.submit_all(batch)
+        return JSONResponse([receipt.model_dump() for receipt in await run.submit_all(batch)])
 
     @app.post(
         "/api/commands",

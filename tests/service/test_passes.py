@@ -120,6 +120,12 @@ def test_a_late_frame_between_two_that_do_not_show_the_cell_is_a_look() -> None:
     assert looks(through(passes, [(6.0, MISS)])) == 1
 
 
+def test_a_late_frame_before_one_that_shows_the_cell_badly_is_of_the_same_pass() -> None:
+    passes = Passes()
+    through(passes, [(1.0, None), (3.0, PARTLY)])
+    assert looks(through(passes, [(2.0, MISS), (4.0, MISS)])) == 1
+
+
 # ---- several sources
 
 
@@ -141,6 +147,16 @@ def test_two_cameras_on_one_cell_share_its_pass_until_neither_shows_it() -> None
     passes.take("b", 3.0, {})
     assert HERE not in passes
     assert looks(passes.take("a", 4.0, {HERE: MISS})) == 1
+
+
+def test_a_pass_goes_on_when_a_second_camera_is_heard_a_little_late() -> None:
+    passes = Passes()
+    passes.take("a", 1.0, {HERE: MISS})
+    passes.take("a", 2.0, {})
+    assert looks(passes.take("b", 1.9, {HERE: MISS})) == 0
+    assert looks(passes.take("b", 2.5, {HERE: MISS})) == 0
+    passes.take("b", 3.0, {})
+    assert looks(passes.take("b", 3.5, {HERE: MISS})) == 1
 
 
 def test_a_source_that_falls_silent_does_not_keep_a_cell_from_being_looked_at() -> None:

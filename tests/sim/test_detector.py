@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
+import httpx
 import pytest
 
-from sim.detector import Detector, contains, main
+from sim.detector import Detector, contains, follow, main
 
 SQUARE = [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
 
@@ -58,6 +60,16 @@ def test_a_better_view_in_the_same_pass_finds_as_many_as_it_would_alone() -> Non
     assert better / 2000 == pytest.approx(0.9, abs=0.03)
 
 
+def test_a_cell_that_stays_in_view_is_looked_at_anew_after_the_time_that_was_set() -> None:
+    detector = Detector((0.4, 0.4), 0.5, 0.5, seed=1, again_s=10.0)
+    verdicts = []
+    for second in range(400):
+        seen = {**state(0), "pose": {"time": float(second)}}
+        verdicts.append(bool(detector.frame(seen)["detections"]))
+    assert all(len(set(verdicts[i : i + 10])) == 1 for i in range(0, 400, 10))
+    assert 10 <= sum(verdicts[::10]) <= 30
+
+
 def test_a_frame_between_cells_reports_that_nothing_was_seen() -> None:
     detector = Detector((0.4, 0.4), 1.0, 0.5, seed=1)
     assert detector.frame(state(0, counts=False))["detections"] == []
@@ -82,3 +94,35 @@ def test_a_wrong_target_is_refused_in_words(text: str, capsys: pytest.CaptureFix
     with pytest.raises(SystemExit):
         main(["--service", "http://127.0.0.1:1", "--target", text])
     assert text in capsys.readouterr().err
+
+
+class FlakyService:
+    """A service whose first answers to reports are faults, though it has the reports."""
+
+    def __init__(self, faults: int) -> None:
+        self.faults, self.reports, self.time = faults, [], 0.0  # type: ignore[var-annotated]
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        if request.method == "GET":
+            self.time += 1.0
+            over = len(self.reports) >= self.faults + 3
+            footprint = state(0)["footprint"]
+            pose = {"time": self.time}
+            running = {"state": "DONE" if over else "SEARCHING", "speedup": 100.0}
+            return httpx.Response(200, json={**running, "pose": pose, "footprint": footprint})
+        self.reports.append(json.loads(request.content))
+        if len(self.reports) <= self.faults:
+            if self.faults % 2:
+                raise httpx.ReadError("the connection has ended")
+            return httpx.Response(503)
+        return httpx.Response(200, json=[])
+
+
+@pytest.mark.parametrize("faults", [1, 2])
+def test_a_report_without_an_answer_is_sent_again_as_it_was(faults: int) -> None:
+    service = FlakyService(faults)
+    with httpx.Client(transport=httpx.MockTransport(service), base_url="http://service") as client:
+        assert follow(client, Detector(None, 0.9, 0.9, seed=1), rate_hz=10.0, patience_s=30.0) == 0
+    again, others = service.reports[: faults + 1], service.reports[faults:]
+    assert all(report == again[0] for report in again)
+    assert len({report["id"] for report in others}) == len(others)

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from service.errors import BadInput
+from service.errors import BadInput, shown
 from service.toml_lines import key_lines
 
 PlannerName = Literal[
@@ -221,7 +221,7 @@ def _problem(details: Any) -> tuple[str, str]:
         known = KNOWN_KEYS if "." in key else tuple(Settings.model_fields)
         hint = f"did you mean '{near}'?" if near else f"known are {', '.join(known)}"
         return key, f"there is no setting '{key}'; {hint}"
-    return key, f"'{key}' = {details['input']!r} is not possible: {details['msg']}"
+    return key, f"'{key}' = {shown(details['input'])} is not possible: {details['msg']}"
 
 
 def read_toml(file: Path) -> tuple[dict[str, Any], str]:

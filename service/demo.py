@@ -55,6 +55,7 @@ class World:
         place = [f"--target={self.target[0]:.7f},{self.target[1]:.7f}"]
         chances = ["--p-tp", f"{sensor.p_tp}", "--p-tn", f"{sensor.p_tn}"]
         seed = ["--seed", str(self.settings.run.seed)]
+        seed += ["--again", f"{sensor.hover_look_s}"] if sensor.hover_look_s else []
         await self.spawn(["detector", "--service", service_url, *place, *chances, *seed], token)
 
     async def spawn(self, words: Sequence[str], token: str = "") -> asyncio.subprocess.Process:

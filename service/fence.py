@@ -49,11 +49,13 @@ class Fence:
             margin_m: how far outside the area it may be.
         """
         margin = max(margin_m, cell_m * math.sqrt(0.5) + _CORNERING_M)
-        hull = shapely.union_all([outline, *(shapely.Point(base) for base in bases)]).convex_hull.buffer(
+        way = shapely.union_all([outline, *(shapely.Point(base) for base in bases)]).convex_hull.buffer(
             margin
         )
-        between = [part for part in shapely.get_parts(exclusions) if part.intersects(hull)]
-        way = shapely.union_all([hull, *(part.buffer(_DETOUR_M) for part in between)]).convex_hull
+        ahead = list(shapely.get_parts(exclusions))
+        while between := [part for part in ahead if part.intersects(way)]:
+            way = shapely.union_all([way, *(part.buffer(_DETOUR_M) for part in between)]).convex_hull
+            ahead = [part for part in ahead if not any(part is each for each in between)]
         search = outline.buffer(margin)
         shapely.prepare(search)
         shapely.prepare(way)

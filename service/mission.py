@@ -21,11 +21,11 @@ from service.config import Settings
 from service.evidence import Observation
 from service.finding import Finding
 from service.flight import Flight, LatLon
-from service.helm import LEAST_PATIENCE_WALL_S, Helm
+from service.helm import Helm
+from service.holds import Holds
 from service.homeward import Homeward
 from service.intake import Intake, JournalLost
 from service.journal import Journal
-from service.limits import hold_objection
 from service.mavlink import LinkError, Vehicle
 from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
 from service.navigator import Cell, Navigator
@@ -43,7 +43,6 @@ LEAVING_S = 5.0
 _CRITICAL = 2  # MAV_SEVERITY
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 MOVING = (*FLYING, State.RETURNING)
-BLIND = {"link", "position"}  # causes of a hold during which the aircraft cannot be sent home either
 
 
 class Mission:
@@ -76,10 +75,6 @@ class Mission:
         self.why_here = ""  # the reason of the last transition
         self.why_stopped = ""
         self.searched = False  # the search ended because there was nothing more to gain, not by an order
-        self._holds: set[str] = set()
-        self._held_since = 0.0
-        self._homeward = False  # a hold on the way home goes on home
-        self._direct = False  # the way home is the autopilot's own: ours could not be flown
         self._resend = False  # the last waypoint may have been lost
         self._hovering = False  # over a suspect, for another look
         self._refused = 0  # waypoints in a row that were not flown
@@ -92,6 +87,7 @@ class Mission:
         self._changed = asyncio.Event()
         self._wake = asyncio.Event()
         self._group = asyncio.TaskGroup()
+        self.holds = Holds(self, tick=self._tick, energy_low=self._energy_low)
         self.finding = Finding(self, write=self._write, tick=self._tick, energy_low=self._energy_low)
         self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
         self.homeward = Homeward(self.helm, clock, fly)
@@ -104,13 +100,10 @@ class Mission:
         if before == after:
             return False
         self.state, self.why_here = after, reason
-        self._homeward = after == State.RETURNING or (self._homeward and after == State.HOLDING)
+        self.holds.entered(after, self.clock.now())
         if not (before in FLYING and after in FLYING):
             self.helm.rest()
-        if after == State.HOLDING:
-            self._held_since = self.clock.now()
-        elif after == State.YIELDED:
-            self._holds.clear()
+        if after == State.YIELDED:
             self.vehicle.release_control(reason)
         elif after == State.DONE:
             self.flight.ended = self.clock.now()
@@ -124,7 +117,7 @@ class Mission:
 
     async def hold(self, cause: str, reason: str) -> None:
         """Hover until `cause` is gone; several causes can hold at once."""
-        self._holds.add(cause)
+        self.holds.causes.add(cause)
         if await self.happen(Event.HOLD, reason):
             refusal = await self.helm.hover(wanted=lambda: self.state == State.HOLDING)
             if refusal is not None:
@@ -149,12 +142,6 @@ class Mission:
         if said and hovers:
             await self.clock.sleep(LEAVING_S)  # a stop that is lost is sent again
 
-    async def release(self, cause: str, reason: str) -> None:
-        """`cause` no longer holds; the search goes on when nothing else does."""
-        self._holds.discard(cause)
-        if not self._holds:
-            await self.happen(Event.RETURN if self._homeward else Event.RESUME, reason)
-
     async def order(self, command: str, place: LatLon | None = None) -> str:
         """An operator's order: hold, resume, return or abort; confirm or reject a place, the present one unless
         given. Returns the state that came of it."""
@@ -178,7 +165,6 @@ class Mission:
         elif command == "resume":
             if self.state in (State.YIELDED, State.HOLDING) and not ours:
                 await self.vehicle.enter_guided()
-            self._holds.clear()
             await self.happen(Event.RESUME, "the operator asked")
         elif command == "return":
             self.why_stopped = self.why_stopped or "the operator asked to return"
@@ -264,7 +250,7 @@ class Mission:
         elif self.state == State.RETURNING:
             await self._go_home()
         elif self.state == State.HOLDING:
-            await self._wait_out_the_hold()
+            await self.holds.wait_out()
         else:
             await self._changed.wait()
 
@@ -304,47 +290,9 @@ class Mission:
         elif why := self._energy_low():
             self.why_stopped = why
             await self._stop_searching(Event.ENERGY_LOW)
-        elif self._detector_silent():
+        elif self.holds.detector_silent():
             log.warning("no detector report for %.0f s: hovering", settings.sensor.silent_after_s)
             await self.hold("detector", "the detector is silent")
-
-    async def _wait_out_the_hold(self) -> None:
-        """Hover until the cause is gone, an operator decides, or it is time to fly home."""
-        while self.state == State.HOLDING:
-            if "detector" in self._holds and not self._detector_silent():
-                await self.release("detector", "the detector reports again")
-            elif "link" in self._holds and self.helm.heard():
-                await self._heard_again()
-            elif "position" in self._holds and not self.helm.doubts():
-                await self.release("position", "the position is good again")
-            elif not self._holds & BLIND and (why := self._energy_low()):
-                self._direct = self._homeward
-                self.why_stopped = why
-                await self._stop_searching(Event.ENERGY_LOW)
-            elif not self._holds & {*BLIND, "operator"} and (
-                why := hold_objection(self.clock.now() - self._held_since, self.settings.flight)
-            ):
-                self._direct = self._homeward
-                self.why_stopped = self.why_stopped or why
-                await self.happen(Event.RETURN, why)
-            await self._tick()
-
-    async def _heard_again(self) -> None:
-        """The autopilot was silent: go on, wait for an operator, or fly home, as the settings say."""
-        said, then = "the autopilot is heard again", self.settings.link.after_silence
-        if then == "hold" and not self._homeward:
-            self._holds.add("operator")
-        self._holds.discard("link")
-        if then == "return" and not self._holds:
-            self.why_stopped = self.why_stopped or "the autopilot was silent"
-            await self.happen(Event.RETURN, said)
-        else:
-            await self.release("link", said)
-
-    def _detector_silent(self) -> bool:
-        """No report for too long; never shorter than what a busy host may need in wall time."""
-        limit = max(self.settings.sensor.silent_after_s, LEAST_PATIENCE_WALL_S * self.clock.speedup)
-        return self.clock.now() - self.intake.last_at > limit
 
     def _energy_low(self) -> str:
         """Why the aircraft must fly home now, or nothing."""
@@ -411,10 +359,11 @@ class Mission:
 
     async def _go_home(self) -> None:
         """Fly home around what must not be flown over, then let the autopilot land."""
-        if self.vehicle.telemetry.guided and not self._direct:
+        if self.vehicle.telemetry.guided and not self.holds.direct:
             for point in self.helm.route(self.helm.home())[:-1]:
                 if not await self._fly_to(point):
                     return
+        self.helm.rest()  # from here the autopilot steers: it need not come nearer to a waypoint of ours
         await self._command(self.vehicle.return_to_launch(), "return to launch")
         while self.state == State.RETURNING:
             if not self.vehicle.telemetry.armed:

@@ -16,17 +16,15 @@ from roisearch import Belief
 from roisearch.detection import DetectionRecord
 from service.base_view import BaseView
 from service.curve import PosCurve
-from service.errors import BadInput
 from service.evidence import Observation, Pose
 from service.feed import Moment
 from service.flight import LatLon
-from service.journal import Row, read_meta, read_rows
+from service.journal import Row
 from service.reports import Receipt, Report
-from service.resume import retrace, stored_settings
+from service.resume import retrace, stored_run
 from service.search import Search
 from service.sensors import make_sensor
 from service.states import FINAL, FLYING, State
-from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.suspects import Sightings
 
 KEPT = 32  # copies of the belief along the run, to go back to
@@ -73,18 +71,10 @@ class ReplayView(BaseView):
     """
 
     def __init__(self, folder: Path) -> None:
-        journal = folder / JOURNAL
-        settings = stored_settings(journal, {})
-        prior = folder / PRIOR
-        area, grid = survey(folder / AREA, prior if prior.exists() else None, settings)
-        if read_meta(journal, "grid") != grid.frame.to_dict():
-            raise BadInput(f"{folder}: its journal is of another grid than its area file makes")
+        settings, area, grid, self.rows = stored_run(folder)
         search = Search(grid, settings)
-        super().__init__(area, search, make_sensor(settings, grid, search.fov), settings)
+        super().__init__(area, search, make_sensor(settings, grid), settings)
         self.registry = CollectorRegistry()
-        self.rows = list(read_rows(journal))
-        if not self.rows:
-            raise BadInput(f"{folder}: its journal is empty; nothing happened that could be shown")
         self.times = monotone([row.time for row in self.rows])
         self._track: list[LatLon] = []
         self._hits: list[LatLon] = []

@@ -68,6 +68,8 @@ def run_report(mission: Mission, area: str, settings: Settings, began: float) ->
         "position": {"lat": found.lat, "lon": found.lon} if found else None,
         "probability": found.probability if found else place.probability,
         "sigma_m": found.sigma_m if found else None,
+        "ellipse": found.ellipse if found else None,
+        "thumbnail": found.thumbnail if found else None,
         "outside": search.belief.outside,
         "steps": flight.steps,
         "flight_time_s": round(flown, 1),

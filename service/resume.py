@@ -6,18 +6,37 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from service.area import Grid, SearchArea
 from service.config import Settings, changed_settings
 from service.errors import BadInput
 from service.evidence import Observation
 from service.intake import Intake
 from service.journal import Row, read_meta, read_rows
 from service.search import Search
+from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.verdict import ROW as VERDICT
 
 
 def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
     """The settings that a run was started with, but for those `changed` ('section.key': value; None: as stored)."""
     return changed_settings(read_meta(journal, "settings"), changed, str(journal))
+
+
+def stored_run(folder: Path) -> tuple[Settings, SearchArea, Grid, list[Row]]:
+    """What a run's folder holds, under way or over: settings, area, grid, and the journal as it is now.
+
+    Raises BadInput when it holds no run that has begun, or its journal is of another grid.
+    """
+    journal = folder / JOURNAL
+    settings = stored_settings(journal, {})
+    prior = folder / PRIOR
+    area, grid = survey(folder / AREA, prior if prior.exists() else None, settings)
+    if read_meta(journal, "grid") != grid.frame.to_dict():
+        raise BadInput(f"{folder}: its journal is of another grid than its area file makes")
+    rows = list(read_rows(journal))
+    if not rows:
+        raise BadInput(f"{folder}: its journal is empty; nothing has happened yet that could be shown")
+    return settings, area, grid, rows
 
 
 def retrace(row: Row, search: Search) -> None:

@@ -19,7 +19,6 @@ from typing import Any
 from rich.console import Console
 
 from service.area import Grid, SearchArea
-from service.calibration import calibration_of
 from service.clock import Clock
 from service.config import Settings
 from service.demo import World
@@ -51,7 +50,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
     set_up_logging(console)
     area, grid = survey(area_file, prior_file, settings)
     _tell(area, grid)
-    calibration_of(settings)  # a wrong table is told before anything starts
+    sensor = make_sensor(settings, grid)
     signing_key = _signing_key(settings)
     with _open(settings) as (door, doors):
         folder = _new_folder(Path(settings.run.folder), area.name)
@@ -61,7 +60,7 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
         journal = Journal(folder / JOURNAL)
         journal.set_meta("grid", grid.frame.to_dict())
         journal.set_meta("settings", settings.model_dump())
-        return _search(area, grid, settings, folder, journal, door, doors, signing_key, console)
+        return _search(area, grid, sensor, settings, folder, journal, door, doors, signing_key, console)
 
 
 def resume(folder: Path, changed: dict[str, Any]) -> int:
@@ -72,7 +71,7 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
     prior_file = folder / PRIOR
     area, grid = survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
     _tell(area, grid)
-    calibration_of(settings)  # a wrong table is told before anything starts
+    sensor = make_sensor(settings, grid)
     signing_key = _signing_key(settings)
     with _open(settings) as (door, doors):
         journal = Journal(folder / JOURNAL)
@@ -80,7 +79,7 @@ def resume(folder: Path, changed: dict[str, Any]) -> int:
             raise BadInput(
                 f"{folder}: its journal is of another grid than its area file makes; resume it unchanged"
             )
-        return _search(area, grid, settings, folder, journal, door, doors, signing_key, console)
+        return _search(area, grid, sensor, settings, folder, journal, door, doors, signing_key, console)
 
 
 @contextlib.contextmanager
@@ -116,6 +115,7 @@ def _signing_key(settings: Settings) -> bytes | None:
 def _search(
     area: SearchArea,
     grid: Grid,
+    sensor: Profile,
     settings: Settings,
     folder: Path,
     journal: Journal,
@@ -127,7 +127,6 @@ def _search(
     """Compile the planner and fly."""
     try:
         search = Search(grid, settings)
-        sensor = make_sensor(settings, grid, search.fov)
         log.info("regions of interest: %d", search.regions.count)
         _compile(console, search)
         service = Service(area, search, sensor, settings, folder, console)
@@ -190,6 +189,11 @@ class Service:
         serving = asyncio.create_task(server.run_until_told())
         listening = asyncio.create_task(doors.serve(self.view.submit_all))
         try:
+            while not server.started:  # a door that cannot be opened is said now, not after the flight
+                if serving.done():
+                    serving.result()
+                    raise RuntimeError("the door has closed before it was open")
+                await asyncio.sleep(0.01)
             connect = await self._start_world()
             link = self._link_settings(signing_key)
             async with Vehicle.open(connect, clock=self.clock, settings=link) as vehicle:
@@ -307,6 +311,9 @@ class Service:
             await mission.leave(str(group.exceptions[0]))
         except* asyncio.CancelledError:
             await mission.leave("stopped by a signal", stop=False)
+        except* Exception as group:  # a mistake of ours: the aircraft does not fly on into it
+            await mission.leave(f"internal error, {group.exceptions[0]!r}")
+            raise
         finally:
             display.cancel()
             watch.cancel()

@@ -37,9 +37,11 @@ class Profile(Protocol):
     def read(self, pose: Pose, report: Report) -> Reading: ...
 
 
-def make_sensor(settings: Settings, grid: Grid, fov: FieldOfView) -> Profile:
-    """The profile on a grid. Raises BadInput when a camera cannot be what the settings say."""
+def make_sensor(settings: Settings, grid: Grid) -> Profile:
+    """The profile on a grid. Raises BadInput when a camera cannot be what the settings say, or a file of theirs is
+    not what it should be."""
     sensor, height = settings.sensor, settings.flight.altitude_m
+    fov = field_of_view(settings, grid.frame.cell_m)
     if sensor.profile != "camera":
         return Sensor(
             frame=grid.frame,

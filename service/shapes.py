@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.polygon import orient
 
 from service.area import Grid, SearchArea
+from service.area.frame import GridFrame
 from service.area.prior import cell_squares
 
 DIGITS = 7  # of a degree: a centimetre
@@ -37,9 +39,9 @@ def line(points: Sequence[Sequence[float]]) -> dict[str, Any]:
 
 def area_features(area: SearchArea, grid: Grid) -> list[dict[str, Any]]:
     """The area as drawn, its exclusions and the launch point."""
-    features = [feature(_plain(area.polygon), "search", name=area.name)]
+    features = [feature(plain(area.polygon), "search", name=area.name)]
     features += [
-        feature(_plain(each.polygon), "exclude", searchable=each.searchable) for each in area.exclusions
+        feature(plain(each.polygon), "exclude", searchable=each.searchable) for each in area.exclusions
     ]
     return [*features, feature(point(*grid.launch), "launch")]
 
@@ -54,7 +56,7 @@ def region_features(grid: Grid, labels: NDArray[np.integer[Any]]) -> list[dict[s
         middle = shapely.point_on_surface(outline)
         lat, lon = grid.frame.from_metres([[middle.x, middle.y]])[0]
         label = [round(float(lat), DIGITS), round(float(lon), DIGITS)]
-        features.append(feature(_on_earth(grid, outline), "region", number=number, label=label))
+        features.append(feature(plain(on_earth(grid.frame, outline)), "region", number=number, label=label))
     return features
 
 
@@ -79,13 +81,19 @@ def cell_features(
     ]
 
 
-def _on_earth(grid: Grid, shape: shapely.Geometry) -> dict[str, Any]:
-    """A geometry in the grid's metres as one in degrees."""
-    return _plain(shapely.transform(shape, lambda xy: grid.frame.from_metres(xy)[:, ::-1]))
+def on_earth(frame: GridFrame, flat: shapely.Geometry) -> shapely.Geometry:
+    """A geometry in the grid's metres (x = east, y = south) as one in degrees (x = longitude)."""
+    return oriented(shapely.transform(flat, lambda points: frame.from_metres(points)[:, ::-1]))
 
 
-def _plain(shape: shapely.Geometry) -> dict[str, Any]:
-    turned = shapely.orient_polygons(shape) if hasattr(shapely, "orient_polygons") else shape
-    rounded = shapely.transform(turned, lambda xy: np.round(xy, DIGITS))
+def oriented(shape: shapely.Geometry) -> shapely.Geometry:
+    """A Polygon or MultiPolygon with its outer rings counter-clockwise (RFC 7946, section 3.1.6)."""
+    parts = [orient(part) for part in shapely.get_parts(shape)]
+    return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
+
+
+def plain(shape: shapely.Geometry) -> dict[str, Any]:
+    """A Polygon or MultiPolygon in degrees as a GeoJSON geometry."""
+    rounded = shapely.transform(oriented(shape), lambda points: np.round(points, DIGITS))
     geometry: dict[str, Any] = shapely.geometry.mapping(rounded)
     return geometry

@@ -67,7 +67,11 @@ class RunView(BaseView):
             ("roisearch_reports_refused", "Detector reports refused", lambda: self._reports()["refused"]),
             ("roisearch_link_silent_seconds", "Time since the autopilot's last heartbeat", self._link_age),
             ("roisearch_link_up", "1 while the autopilot is heard", lambda: float(self._link()["up"])),
-            ("roisearch_link_quality", "Part of the last heartbeats that came in time", self._link_quality),
+            (
+                "roisearch_link_quality",
+                "Part of the autopilot's last messages that arrived",
+                self._link_quality,
+            ),
             ("roisearch_battery_percent", "State of charge as the autopilot tells it", self._battery),
             ("roisearch_steps", "Cells flown", lambda: self.mission.flight.steps if self.mission else 0),
             ("roisearch_tasks", "Tasks of the event loop", lambda: len(asyncio.all_tasks())),

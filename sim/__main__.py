@@ -7,8 +7,12 @@ import sys
 
 COMMANDS: dict[str, tuple[str, str]] = {
     # command: (module with main(arguments) -> exit code, one line of help)
+    "ablation": ("sim.ablation", "what each part of the default planner is worth, above the bound"),
     "autopilot": ("sim.autopilot.cli", "a mock PX4 or ArduPilot on a real socket"),
-    "bench": ("sim.bench", "the planner against its plain twin, as ratios; 'bench intake': reports a second"),
+    "bench": (
+        "sim.bench",
+        "the planner against its plain twin; 'bench intake': reports; 'bench autopilot': many mocks",
+    ),
     "detector": ("sim.detector", "a simulated detector that follows the aircraft"),
     "flights": ("sim.flights", "whole searches with the real service, counted"),
     "soak": ("sim.soak.cli", "flights under random faults, with everything judged that must never happen"),

@@ -1,81 +1,273 @@
-"""What each part of the sweep planner is worth, by the exact detection curve: `python -m sim.ablation --help`.
+"""`roisearch-sim ablation`: what each part of the sweep planner is worth, by the exact detection curve.
 
-Every variant flies the same held-out priors, from the paper's start, with a point field of view and no
-false alarms. E[T] is restricted to the cap of 40 000 steps and set against the release bound of the same
-prior.
+Every variant flies the same held-out priors from the paper's start, planning at every step; only a path
+that was given without thinking is flown to its end before the next plan, when no false alarm can end it.
+E[T] is restricted to the cap of 40 000 steps and set against what the prior allows: the release bound with
+a point field of view, the multi-cell bound with another one. With false alarms it is set against the
+teleporting reference (`roisearch.bounds`), and both sides are averaged over the same number of draws,
+seeded alike. The results are kept in the folder: the same command goes on where it stopped.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import dataclasses
+import json
+import shlex
 import sys
 import time
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from roisearch import FieldOfView, Planner
-from roisearch.bounds import expected_time, release
-from roisearch.planners.index import IndexPlanner
+from roisearch import PLANNERS, Belief, Decision, FieldOfView, Planner, SearchState, make_planner
+from roisearch.bounds import expected_time, multi_cell, release, teleport_reference
+from roisearch.planners.base import Progress
 from roisearch.planners.sweep import SweepPlanner, SweepSettings
 from sim.ruler import detection_curve
 from sim.scenario import PAPER_START, PAPER_STEPS, paper_prior
 
 P_TP = 0.9
+VARIANTS = "iterations=0 iterations=1,horizon=3000 iterations=8,horizon=5000"
+SHARES = (50.0, 95.0, 99.9, 100.0)
+"""Percentiles of the time that a decision takes; the last is the slowest."""
+FIELDS = ("variant", "fov", "p_tn", "equal", "deadline_ms", "seed", "draw", "expected", "reference", "steps",
+          "first_cpu_ms", "first_wall_ms",
+          *(f"cpu_ms_{p:g}" for p in SHARES), *(f"wall_ms_{p:g}" for p in SHARES))  # fmt: skip
+Row = dict[str, str]
 
 
-def variants(names: str) -> dict[str, Planner]:
-    """Planners by name: `index`, or settings such as `iterations=4,horizon=1000`; separated by spaces."""
-    fov = FieldOfView.point(P_TP, 1.0)
-    made: dict[str, Planner] = {}
-    for name in names.split():
-        if name == "index":
-            made[name] = IndexPlanner(fov=fov)
+class Clocked:
+    """A planner whose decisions are timed: processor time of the thread, and time by the clock."""
+
+    def __init__(self, planner: Planner) -> None:
+        self.planner, self.name = planner, planner.name
+        self.times: list[tuple[float, float]] = []
+
+    def plan(
+        self, belief: Belief, state: SearchState, rng: np.random.Generator, *, deadline_s: float | None = None
+    ) -> Decision:
+        """As the planner's."""
+        cpu, wall = time.thread_time(), time.perf_counter()
+        decision = self.planner.plan(belief, state, rng, deadline_s=deadline_s)
+        self.times.append((time.thread_time() - cpu, time.perf_counter() - wall))
+        return decision
+
+    def warm_up(self, progress: Progress | None = None) -> None:
+        """As the planner's."""
+        self.planner.warm_up(progress)
+
+    def milliseconds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Of the first decision, [2], and of the others by `SHARES`, [shares, 2]; processor, clock."""
+        times = 1000.0 * np.array(self.times)
+        return times[0], np.percentile(times[1:] if len(times) > 1 else times, SHARES, axis=0)
+
+
+def planner_named(name: str, fov: FieldOfView) -> Planner:
+    """A planner by its name, or the sweep planner with settings such as `iterations=4,horizon=1000`.
+
+    Raises:
+        ValueError: when there is no such planner or setting, in one sentence.
+    """
+    if name in PLANNERS:
+        return make_planner(name, fov=fov)
+    types = {field.name: str(field.type) for field in dataclasses.fields(SweepSettings)}
+    values: dict[str, Any] = {}
+    for part in name.split(","):
+        key, _, value = part.partition("=")
+        if key not in types:
+            raise ValueError(f"'{key}' is neither a planner nor one of the settings {', '.join(types)}")
+        values[key] = float(value) if types[key] == "float" else int(value)
+    return SweepPlanner(SweepSettings(**values), fov=fov)
+
+
+def field_of_view(name: str, p_tn: float) -> FieldOfView:
+    """point, donut or wide-angle."""
+    made = {"point": FieldOfView.point, "donut": FieldOfView.donut, "wide-angle": FieldOfView.wide_angle}
+    return made[name](P_TP, p_tn)
+
+
+def reference_time(prior: NDArray[np.float64], fov: FieldOfView, p_tn: float, seed: tuple[int, int]) -> float:
+    """E[T] of what the result is set against; see the module's text."""
+    if not fov.is_point:
+        return expected_time(multi_cell(prior, PAPER_START, fov, P_TP, PAPER_STEPS))
+    if p_tn == 1.0:
+        return expected_time(release(prior, PAPER_START, P_TP, PAPER_STEPS))
+    rng = np.random.default_rng(seed)
+    return expected_time(teleport_reference(prior, P_TP, p_tn, PAPER_STEPS, rng, draws=1))
+
+
+def fly(variant: str, seed: int, draw: int, options: argparse.Namespace) -> Row:
+    """One search of one prior: its row of the results."""
+    fov = field_of_view(options.fov, options.p_tn)
+    prior = paper_prior(np.random.default_rng(seed), equal=options.equal)
+    planner = Clocked(planner_named(variant, fov))  # a new one: it takes its regions from the first belief
+    deadline = None if options.deadline_ms is None else options.deadline_ms / 1000.0
+    curve = detection_curve(
+        planner, prior, PAPER_START, P_TP, PAPER_STEPS, np.random.default_rng((seed, draw)), options.p_tn, fov,
+        deadline_s=deadline, stop_below=options.stop_below, follow=variant not in PLANNERS and options.p_tn == 1.0,
+    )  # fmt: skip
+    first, others = planner.milliseconds()
+    numbers = [expected_time(curve), reference_time(prior, fov, options.p_tn, (seed, draw))]
+    clocks = [*first, *others[:, 0], *others[:, 1]]
+    texts = [*key_of(variant, seed, draw, options), *(f"{x:.3f}" for x in numbers), str(len(planner.times)),
+             *(f"{x:.4f}" for x in clocks)]  # fmt: skip
+    return dict(zip(FIELDS, texts, strict=True))
+
+
+def key_of(variant: str, seed: int, draw: int, options: argparse.Namespace) -> tuple[str, ...]:
+    """What tells one result from another: the first seven fields."""
+    return (variant, options.fov, f"{options.p_tn:g}", options.equal, f"{options.deadline_ms or 0:g}", str(seed),
+            str(draw))  # fmt: skip
+
+
+def averaged(rows: list[Row]) -> NDArray[np.float64]:
+    """E[T] and its reference for each prior, float [priors, 2], the mean over the draws."""
+    seeds = sorted({int(row["seed"]) for row in rows})
+    return np.array([
+        np.mean([(float(r["expected"]), float(r["reference"])) for r in rows if int(r["seed"]) == seed], axis=0)
+        for seed in seeds
+    ])  # fmt: skip
+
+
+def above(times: NDArray[np.float64]) -> dict[str, float]:
+    """How far above the reference: the ratio of sums and the mean of ratios, with one standard error each."""
+    n = len(times)
+    ours, theirs = times[:, 0], times[:, 1]
+    ratio, ratios = ours.sum() / theirs.sum(), ours / theirs
+    spare = np.sqrt(n / max(1, n - 1))
+    return {
+        "priors": n,
+        "expected": float(ours.mean()),
+        "reference": float(theirs.mean()),
+        "ratio_of_sums": float(ratio - 1.0),
+        "ratio_of_sums_error": float(spare * np.sqrt(((ours - ratio * theirs) ** 2).sum()) / theirs.sum()),
+        "mean_of_ratios": float(ratios.mean() - 1.0),
+        "mean_of_ratios_error": float(spare * ratios.std() / np.sqrt(n)),
+    }
+
+
+def summary_of(rows: list[Row]) -> dict[str, Any]:
+    """One variant in numbers. Percentiles of decision times are the median and the worst over the priors."""
+    found: dict[str, Any] = above(averaged(rows))
+    for clock in ("cpu", "wall"):
+        for p in SHARES:
+            values = [float(row[f"{clock}_ms_{p:g}"]) for row in rows]
+            found[f"{clock}_ms_{p:g}"] = float(np.max(values) if p == 100.0 else np.median(values))
+        found[f"first_{clock}_ms"] = float(np.median([float(row[f"first_{clock}_ms"]) for row in rows]))
+    return found
+
+
+def report(rows: list[Row], options: argparse.Namespace, command: str) -> str:
+    """The results as Markdown."""
+    what = "the teleporting reference" if options.p_tn < 1.0 else "the bound"
+    lines = [
+        f"{options.fov} field of view, p_tp = {P_TP:g}, p_tn = {options.p_tn:g}, start {PAPER_START}, at most "
+        f"{PAPER_STEPS} steps; one standard error after ±.", "", f"    {command}", "",
+        f"| planner | priors | E[T] | of {what} | above it: ratio of sums | mean of ratios "
+        "| decision, processor ms: 50, 95, 99.9 %, most | by the clock | the first |",
+        "|---" * 9 + "|",
+    ]  # fmt: skip
+    for variant in options.variants.split():
+        own = [row for row in rows if row["variant"] == variant]
+        if not own:
             continue
-        options = dict(part.split("=") for part in name.split(","))
-        types = {field.name: field.type for field in dataclasses.fields(SweepSettings)}
-        values = {key: float(v) if types[key] == "float" else int(v) for key, v in options.items()}
-        made[name] = SweepPlanner(SweepSettings(**values), fov=fov)  # type: ignore[arg-type]
-    return made
+        s = summary_of(own)
+        clocks = [", ".join(f"{s[f'{c}_ms_{p:g}']:.2f}" for p in SHARES) for c in ("cpu", "wall")]
+        lines.append(
+            f"| `{variant}` | {s['priors']} | {s['expected']:.0f} | {s['reference']:.0f} "
+            f"| {s['ratio_of_sums']:.1%} ± {100 * s['ratio_of_sums_error']:.1f} "
+            f"| {s['mean_of_ratios']:.1%} ± {100 * s['mean_of_ratios_error']:.1f} "
+            f"| {clocks[0]} | {clocks[1]} | {s['first_cpu_ms']:.0f} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def plot(rows: list[Row], variants: list[str], path: Path) -> None:
+    """Each prior's E[T] above the reference, the priors in the order of the first variant's."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, panel = plt.subplots(figsize=(9, 4), layout="constrained")
+    order: dict[int, int] = {}
+    for variant, colour in zip(
+        variants, ("#b0b0b0", "#d08c3a", "#1f6f8b", "#7a3b8f", "#3b8f4a"), strict=False
+    ):
+        own = [row for row in rows if row["variant"] == variant]
+        seeds = sorted({int(row["seed"]) for row in own})
+        times = averaged(own)
+        percent = 100.0 * (times[:, 0] / times[:, 1] - 1.0)
+        if not order:
+            order = {seed: place for place, seed in enumerate(np.array(seeds)[np.argsort(percent)].tolist())}
+        places = [order[seed] for seed in seeds if seed in order]
+        values = [value for seed, value in zip(seeds, percent, strict=True) if seed in order]
+        panel.plot(places, values, "o", ms=4, color=colour, label=f"{variant}: mean {np.mean(percent):.1f} %")
+    panel.set_xlabel("prior, in the order of the first planner")
+    panel.set_ylabel("E[T] above the bound, %")
+    panel.grid(alpha=0.3)
+    panel.legend(frameon=False)
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser(prog="roisearch-sim ablation", description=__doc__)
+    p.add_argument("--variants", default=VARIANTS, help="planners, or settings of the sweep planner, with spaces "
+                   f"between (default '{VARIANTS}')")  # fmt: skip
+    p.add_argument("--first", type=int, default=5000, help="seed of the first prior (default 5000)")
+    p.add_argument("--priors", type=int, default=40, help="how many (default 40)")
+    p.add_argument("--fov", choices=("point", "donut", "wide-angle"), default="point")
+    p.add_argument("--p-tn", type=float, default=1.0, help="P(no hit | target not there) (default 1)")
+    p.add_argument("--draws", type=int, default=1, help="draws of false alarms for each prior (default 1)")
+    p.add_argument("--equal", choices=("height", "mass"), default="height", help="what the Gaussians share")
+    p.add_argument("--deadline-ms", type=float, help="handed to plan() at every step (not repeatable)")
+    p.add_argument("--stop-below", type=float, default=5e-5, help="undetected mass at which F is held")
+    p.add_argument("--out", type=Path, default=Path("ablation"), help="folder of the results")
+    return p
 
 
 def main(arguments: list[str]) -> int:
-    """Print a line for each prior and variant, and the means so far."""
-    parser = argparse.ArgumentParser(prog="python -m sim.ablation", description=__doc__)
-    parser.add_argument("--first", type=int, default=5000, help="seed of the first prior")
-    parser.add_argument("--priors", type=int, default=40)
-    parser.add_argument("--equal", default="height", help="what the Gaussians have in common: height or mass")
-    parser.add_argument("--deadline-ms", type=float, help="handed to plan() at every step")
-    parser.add_argument("--stop-below", type=float, default=2e-4, help="undetected mass at which F is held")
-    parser.add_argument("--variants", default="index iterations=0 iterations=1 iterations=8")
-    options = parser.parse_args(arguments)
-    deadline = None if options.deadline_ms is None else options.deadline_ms / 1000.0
-    planners = variants(options.variants)
-    times = np.zeros((0, 1 + len(planners)))
+    """Fly what is missing, then write the table, the summary and the figure; 2 for bad input."""
+    options = parser().parse_args(arguments)
+    variants = options.variants.split()
+    try:
+        for variant in variants:
+            planner_named(variant, field_of_view(options.fov, options.p_tn)).warm_up()
+    except ValueError as error:
+        print(f"roisearch-sim ablation: {error}", file=sys.stderr)
+        return 2
+    options.out.mkdir(parents=True, exist_ok=True)
+    results = options.out / "results.csv"
+    kept: dict[tuple[str, ...], Row] = {}
+    if results.exists():
+        with results.open(newline="", encoding="utf-8") as file:
+            kept = {tuple(row[name] for name in FIELDS[:7]): row for row in csv.DictReader(file)}
+    else:
+        results.write_text(",".join(FIELDS) + "\n", encoding="utf-8")
+    rows: list[Row] = []
     for seed in range(options.first, options.first + options.priors):
-        prior = paper_prior(np.random.default_rng(seed), equal=options.equal)
-        row = [expected_time(release(prior, PAPER_START, P_TP, PAPER_STEPS))]
-        for name, planner in planners.items():
-            began = time.process_time()
-            curve = detection_curve(
-                planner, prior, PAPER_START, P_TP, PAPER_STEPS, np.random.default_rng(seed),
-                deadline_s=deadline, stop_below=options.stop_below,
-            )  # fmt: skip
-            row.append(expected_time(curve))
-            steps = int(np.argmax(curve >= curve[-1]))
-            spent = 1000.0 * (time.process_time() - began) / max(1, steps)
-            print(
-                f"prior {seed} {name}: E[T] {row[-1]:.0f}, bound {row[0]:.0f}, {spent:.2f} ms a step",
-                flush=True,
-            )
-        times = np.vstack([times, row])
-        for i, name in enumerate(planners, start=1):
-            ratios = times[:, i] / times[:, 0]
-            whole = times[:, i].sum() / times[:, 0].sum()
-            print(
-                f"  {len(times)} priors, {name}: {whole - 1:.1%} above the bound, "
-                f"mean of ratios {ratios.mean() - 1:.1%}"
-            )
+        for draw in range(options.draws if options.p_tn < 1.0 else 1):
+            for variant in variants:
+                key = key_of(variant, seed, draw, options)
+                if key not in kept:
+                    kept[key] = fly(variant, seed, draw, options)
+                    with results.open("a", newline="", encoding="utf-8") as file:
+                        csv.DictWriter(file, FIELDS).writerow(kept[key])
+                rows.append(kept[key])
+                ratio = float(kept[key]["expected"]) / float(kept[key]["reference"])
+                print(f"prior {seed} draw {draw} {variant}: {ratio - 1:.1%} above", flush=True)
+    text = report(rows, options, shlex.join(["roisearch-sim", "ablation", *arguments]))
+    (options.out / "ablation.md").write_text(text, encoding="utf-8")
+    summary = {v: summary_of([row for row in rows if row["variant"] == v]) for v in variants}
+    (options.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    plot(rows, variants, options.out / "above-bound.png")
+    print(text)
     return 0
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import importlib
 import sys
 import time
 from collections.abc import Callable
@@ -255,11 +256,11 @@ def plot(found: list[Growth], path: Path) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the benchmark; 1 with `--check` when a ratio misses its target, else 0. `bench intake` is another one."""
-    if arguments[:1] == ["intake"]:
-        from sim.bench_intake import main as bench_intake
-
-        return bench_intake(arguments[1:])
+    """Run the benchmark; 1 with `--check` when a ratio misses its target, else 0. `intake`, `autopilot` are others."""
+    others = {"intake": "sim.bench_intake", "autopilot": "sim.autopilot.bench"}
+    if arguments and arguments[0] in others:
+        code: int = importlib.import_module(others[arguments[0]]).main(arguments[1:])
+        return code
     parser = argparse.ArgumentParser(prog="roisearch-sim bench", description=main.__doc__)
     parser.add_argument("--out", type=Path, default=Path("bench"), help="folder for bench.md and bench.png")
     parser.add_argument("--steps", type=int, default=100, help="decisions that the twin flies (default 100)")

@@ -9,6 +9,7 @@ those of a real camera do: one draw decides the pass, and a miss turns into a hi
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import time
@@ -34,10 +35,14 @@ def contains(corners: Sequence[Sequence[float]], point: Point) -> bool:
 class Detector:
     """Draws once per cell and pass. `target` is (lat, lon), or None when there is nothing to find."""
 
-    def __init__(self, target: Point | None, p_tp: float, p_tn: float, seed: int) -> None:
+    def __init__(
+        self, target: Point | None, p_tp: float, p_tn: float, seed: int, again_s: float = math.inf
+    ) -> None:
+        """`again_s`: a cell that stays in view for so many seconds gets another draw (see sensor.hover_look_s)."""
         self.target, self.p_tp, self.p_tn = target, p_tp, p_tn
         self._rng = np.random.default_rng(seed)
-        self._draws: dict[tuple[int, int], float] = {}
+        self._again_s = again_s
+        self._draws: dict[tuple[int, int], tuple[float, float]] = {}  # the draw, and when it was made
         self._hits: set[tuple[int, int]] = set()
         self._prefix = uuid.uuid4().hex[:12]
         self._count = 0
@@ -49,12 +54,15 @@ class Detector:
         for gone in self._draws.keys() - cells.keys():
             del self._draws[gone]
             self._hits.discard(gone)
-        detections = []
+        detections, now = [], state["pose"]["time"]
         for key, cell in cells.items():
             if not cell["counts"]:
                 continue
             there = self.target is not None and contains(cell["corners"], self.target)
-            draw = self._draws.setdefault(key, float(self._rng.random()))
+            draw, made = self._draws.get(key, (0.0, -math.inf))
+            if key not in self._draws or now >= made + self._again_s:
+                draw, made = self._draws[key] = float(self._rng.random()), now
+                self._hits.discard(key)
             if draw < self._chance(cell, footprint, there):
                 self._hits.add(key)
             if key in self._hits:
@@ -148,6 +156,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--p-tn", type=_probability, default=0.9, help="P(no report | not there) (default 0.9)"
     )
+    parser.add_argument(
+        "--again", type=float, default=math.inf, metavar="S", help="look anew after so long (default: never)"
+    )
     parser.add_argument("--rate", type=float, default=2.0, metavar="HZ", help="frames a second (default 2)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
@@ -163,7 +174,7 @@ def main(arguments: list[str]) -> int:
         print(f"roisearch-sim detector: the token cannot be read ({error})", file=sys.stderr)
         return 2
     headers = {"Authorization": f"Bearer {token}"} if token else {}
-    detector = Detector(options.target, options.p_tp, options.p_tn, options.seed)
+    detector = Detector(options.target, options.p_tp, options.p_tn, options.seed, options.again)
     with httpx.Client(base_url=options.service, headers=headers, timeout=5.0) as client:
         try:
             return follow(client, detector, options.rate, options.patience)

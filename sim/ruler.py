@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch import Belief, FieldOfView, Planner, SearchState
+from roisearch import Belief, Decision, FieldOfView, Planner, SearchState
 from roisearch.fov import HEADINGS, MOVES
 
 
@@ -30,13 +30,16 @@ def detection_curve(
     deadline_s: float | None = None,
     stop_below: float = 0.0,
     searchable: NDArray[np.bool_] | None = None,
+    follow: bool = False,
 ) -> NDArray[np.float64]:
-    """F of `planner` on `prior`, float [steps + 1]; it plans at every step.
+    """F of `planner` on `prior`, float [steps + 1]; it plans at every step, unless `follow`.
 
     Args: p_tp, p_tn: of every cell of the field of view. fov: what is seen; a point unless given. The
         planner must have been made for the same. deadline_s: handed to `plan`. stop_below: stop when less
         than this is undetected, and count F as constant from there on, which can only overstate the
-        expected time.
+        expected time. follow: a path that was given without thinking (`Effort.iterations` = 0) is flown
+        to its end before the next plan, which saves time where a planner that keeps its plan would only
+        repeat it.
     """
     view = fov or FieldOfView.point()
     belief = Belief(prior, searchable=searchable)
@@ -44,9 +47,12 @@ def detection_curve(
     state = SearchState(start, heading)
     curve = np.zeros(steps + 1)
     found = 0.0
+    ahead: list[tuple[int, int]] = []
     for step in range(1, steps + 1):
-        decision = planner.plan(belief, state, rng, deadline_s=deadline_s)
-        cell = decision.path[0]
+        if not ahead:
+            decision = planner.plan(belief, state, rng, deadline_s=deadline_s)
+            ahead = unthought(decision, state.cell) if follow else [decision.path[0]]
+        cell = ahead.pop(0)
         move = MOVES.index((cell[0] - state.cell[0], cell[1] - state.cell[1]))
         state = SearchState(cell, HEADINGS[move])
         seen = view.cells(cell, state.heading, belief.shape)
@@ -60,3 +66,14 @@ def detection_curve(
             curve[step:] = found
             break
     return np.minimum(curve, 1.0)
+
+
+def unthought(decision: Decision, at: tuple[int, int]) -> list[tuple[int, int]]:
+    """The cells to fly before the next plan: one, or if nothing was thought all until a cell comes again."""
+    cells = [decision.path[0]]
+    if decision.effort.iterations == 0:
+        for cell in decision.path[1:]:
+            if cell == at or cell in cells:
+                break
+            cells.append(cell)
+    return cells

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import light_kernel as kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -40,6 +40,7 @@ def _cache_folder() -> Path:
 
 
 _config: Any = numba.config
+_LEVEL = int(_config.OPT)
 _compiler_lock: Any = compiler_lock.global_compiler_lock
 _config.CACHE_DIR = str(_cache_folder())
 
@@ -56,6 +57,11 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     return _compiled(function, _nrt=False)
 
 
+def light_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """As `kernel`, at LLVM's level 1: for the many kernels of the sweeps, which are as fast so, and ready sooner."""
+    return _compiled(function, level=1, _nrt=False)
+
+
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """As `kernel`, for a small function: the compiler puts its body where it is called."""
     return _compiled(function, _nrt=False, forceinline=True)
@@ -66,14 +72,14 @@ def allocating_kernel(function: Callable[P, R]) -> Callable[P, R]:
     return _compiled(function)
 
 
-def _compiled(function: Callable[P, R], **options: Any) -> Callable[P, R]:
+def _compiled(function: Callable[P, R], level: int = 3, **options: Any) -> Callable[P, R]:
     njit: Any = numba.njit
     shared = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
     from_python = njit(**shared)(function)
     from_kernels = njit(**shared, no_cpython_wrapper=True)(_twin(function))
     _call_in_kernels(from_python, from_kernels)
     for dispatcher in (from_python, from_kernels):
-        _optimise_lightly(dispatcher)
+        _optimise(dispatcher, level)
     return cast(Callable[P, R], from_python)
 
 
@@ -112,20 +118,20 @@ def _call_in_kernels(kernel: Any, inside: Any) -> None:
     kernel.get_overload = inside.get_overload
 
 
-def _optimise_lightly(dispatcher: Any) -> None:
-    """Compile at LLVM's level 1: as fast a kernel as level 3 makes, in three quarters of the time.
+def _optimise(dispatcher: Any, most: int) -> None:
+    """Compile at LLVM's level `most`, or what NUMBA_OPT says if that is less.
 
-    The level is the process's, and its other numba functions keep theirs.
+    The level is the process's: what else it compiles keeps its own.
     """
     compile_ = dispatcher.compile
 
-    def compile_lightly(signature: Any) -> Any:
+    def compile_at_level(signature: Any) -> Any:
         with _compiler_lock:
-            level = _config.OPT
-            _config.OPT = type(level)(min(level, 1))
+            before = _config.OPT
+            _config.OPT = type(before)(min(_LEVEL, most))
             try:
                 return compile_(signature)
             finally:
-                _config.OPT = level
+                _config.OPT = before
 
-    dispatcher.compile = compile_lightly
+    dispatcher.compile = compile_at_level

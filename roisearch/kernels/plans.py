@@ -9,8 +9,8 @@ anywhere, and at the root the four moves. An iteration
 1. selects: from the root it follows argmax Q + explore * P * sqrt(N) / (1 + n), flying the plan as long as
    that says to keep to it, and adds one node where the plan has none yet;
 2. simulates: at another action, it draws how far down to sweep (lambda), for how long at most, and with
-   which balance of worth and distance, and follows that sweep; then the index rule, as the rollout, to the
-   horizon of the plan;
+   which balance of worth and distance, and follows that sweep; with probability `chain` another sweep drawn
+   at random, and so on; then the index rule, as the rollout, to the horizon of the plan;
 3. evaluates: the area under the survival curve, which is the expected time, plus what clearing the rest
    takes without travel, times `overhead`;
 4. backs up: the visits, and the least loss against the plan. When the new line is better it becomes the
@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch.kernels.chart import Chart, Floats, Ints, begin, copy_table, restore, time_to_clear
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import light_kernel as kernel
 from roisearch.kernels.sweeps import (
     ANYWHERE,
     Wave,
@@ -53,6 +53,7 @@ class Rules(NamedTuple):
 
     nears: Floats
     followers: int
+    chain: float
     explore: float
     keep: float
     spread: float
@@ -70,8 +71,9 @@ class Tree(NamedTuple):
     the same of the line being tried. at: int [nodes], where on the path a node stands. stats: float [nodes,
     actions, 3]: P(a), least loss (of keeping to the plan: 0), visits. Actions: 0-3 moves, 4 anywhere, 4 + k
     region k, last: keep to the plan. worths: float [nodes, regions + 1], the largest worth in each region.
-    scores: float [regions + 1], room. value: float [EXPECTED, ...], area under the survival curve of the
-    plan, the rest included.
+    scores: float [regions + 1], room. value: float [EXPECTED, UNDETECTED, LEFT]: area under the survival
+    curve of the plan, the rest included; the mass not detected now, and at the end of the plan as it was
+    last carried on.
     """
 
     path: Ints
@@ -88,7 +90,7 @@ class Tree(NamedTuple):
 
 NOW, LENGTH, NODES = 0, 1, 2
 P_A, LOSS, N_A = 0, 1, 2
-EXPECTED, UNDETECTED = 0, 1
+EXPECTED, UNDETECTED, LEFT = 0, 1, 2
 
 
 @kernel
@@ -96,6 +98,12 @@ def draw(state: NDArray[np.uint64]) -> float:
     """A number from 0 to just below 1, from a linear congruential generator (Knuth's MMIX constants)."""
     state[0] = state[0] * MULTIPLIER + INCREMENT
     return float(np.int64(state[0] >> np.uint64(11))) * 2.0**-53
+
+
+@kernel
+def lower(state: NDArray[np.uint64]) -> float:
+    """How far below its peak a region is swept: a factor between 0.9 and 0.02, evenly in its logarithm."""
+    return float(10.0 ** (-0.05 - 1.6 * draw(state)))
 
 
 @kernel
@@ -158,6 +166,7 @@ def extend(
     fill(tree.action, length, length + steps, ANYWHERE)
     tree.mark[LENGTH] = length + steps
     tree.value[EXPECTED] = area + more + rest(chart, undetected, rules)
+    tree.value[LEFT] = undetected
     restore(chart)
 
 
@@ -233,8 +242,8 @@ def iterate(
     home: NDArray[np.int32],
     wave: Wave,
     state: NDArray[np.uint64],
-) -> None:
-    """One iteration; see the module's text. The pose is the root's, at path[NOW]."""
+) -> bool:
+    """One iteration; see the module's text. The pose is the root's, at path[NOW]. True for a better plan."""
     begin(chart)
     keep = tree.stats.shape[1] - 1
     end = tree.mark[LENGTH]
@@ -261,7 +270,7 @@ def iterate(
         node = following
     if action < 0:
         restore(chart)
-        return
+        return False
 
     begun = t
     region, floor, most = ANYWHERE, 0.0, int(10.0 ** (1.0 + 2.0 * draw(state)))
@@ -277,40 +286,50 @@ def iterate(
         most = 0
     elif action > 4:
         region = action - 4
-        floor = tree.worths[node, region] * 10.0 ** (-0.05 - 1.6 * draw(state))
-    most = min(most, end - t)
-    more, undetected, steps, row, col, heading = sweep(
-        row, col, heading, chart, rules.nears[balance], labels, home, region, floor, most, undetected,
-        tree.trial, t, wave,
-    )  # fmt: skip
-    area += more
-    turned = t + steps
+        floor = tree.worths[node, region] * lower(state)
+    fill(tree.trial_action, begun, t, region)
+    while True:
+        more, undetected, steps, row, col, heading = sweep(
+            row, col, heading, chart, rules.nears[balance], labels, home, region, floor, min(most, end - t),
+            undetected, tree.trial, t, wave,
+        )  # fmt: skip
+        area += more
+        fill(tree.trial_action, t, t + steps, region)
+        t += steps
+        if t >= end or draw(state) >= rules.chain:
+            break
+        region, most = int(draw(state) * tree.worths.shape[1]), int(10.0 ** (1.0 + 2.0 * draw(state)))
+        floor = tree.worths[node, region] * lower(state)
+        if region == 0:
+            region, floor = ANYWHERE, 0.0
+        balance = int(draw(state) * rules.nears.shape[0])
     follower = int(draw(state) * rules.followers) if draw(state) < 0.3 else 0
     more, undetected, steps, row, col, heading = sweep(
-        row, col, heading, chart, rules.nears[follower], labels, home, ANYWHERE, 0.0, end - turned,
-        undetected, tree.trial, turned, wave,
+        row, col, heading, chart, rules.nears[follower], labels, home, ANYWHERE, 0.0, end - t,
+        undetected, tree.trial, t, wave,
     )  # fmt: skip
+    fill(tree.trial_action, t, t + steps, ANYWHERE)
     area += more + rest(chart, undetected, rules)
     restore(chart)
 
     loss = area - tree.value[EXPECTED]
     stats = tree.stats[node, action]
-    if turned + steps < end:  # nothing left to sweep, or no more room: not comparable
+    if t + steps < end:  # nothing left to sweep, or no more room: not comparable
         loss = max(loss, rules.spread * tree.value[EXPECTED])
     stats[LOSS] = loss if stats[N_A] == 0.0 else min(stats[LOSS], loss)
     stats[N_A] += 1.0
     if loss >= -1e-12 * tree.value[EXPECTED]:
         stats[LOSS] = max(stats[LOSS], 0.0)
-        return
-    adopt(node, begun, turned, end, region, loss, tree)
+        return False
+    adopt(node, begun, end, loss, tree)
+    return True
 
 
 @kernel
-def adopt(node: int, begun: int, turned: int, end: int, region: int, loss: float, tree: Tree) -> None:
-    """Make the trial the plan: it leaves the plan at `begun` and sweeps `region` until `turned`."""
+def adopt(node: int, begun: int, end: int, loss: float, tree: Tree) -> None:
+    """Make the trial the plan: it leaves the plan at `begun`."""
     copy_range(tree.trial, tree.path, begun, end)
-    fill(tree.action, begun, turned, region)
-    fill(tree.action, turned, end, ANYWHERE)
+    copy_range(tree.trial_action, tree.action, begun, end)
     tree.value[EXPECTED] += loss
     tree.mark[NODES] = node + 1
     keep = tree.stats.shape[1] - 1

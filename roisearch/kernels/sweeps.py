@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch.kernels.chart import AREA, BLOCK, Chart, Floats, Ints, gain_from, is_full, look
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import light_kernel as kernel
 
 ANYWHERE = -1
-RING, HOLD = 2, 4
+RING, HOLD = 2, 8
 """Blocks around the drone's own that are looked through at every step; steps for which `far_limit` holds."""
 
 
@@ -168,21 +168,22 @@ def best_close(
     """As `best_far`, but only RING blocks around the drone's own."""
     own_row, own_col = row // BLOCK, col // BLOCK
     cell = -1
-    cell, best = scan_block(
-        own_row,
-        own_col,
-        row,
-        col,
-        chart.rows,
-        chart.cols,
-        chart.worth,
-        near,
-        labels,
-        region,
-        floor,
-        cell,
-        best,
-    )
+    if chart.peaks[own_row, own_col] * near[2] > best:
+        cell, best = scan_block(
+            own_row,
+            own_col,
+            row,
+            col,
+            chart.rows,
+            chart.cols,
+            chart.worth,
+            near,
+            labels,
+            region,
+            floor,
+            cell,
+            best,
+        )
     for block_row in range(max(0, own_row - RING), min(chart.peaks.shape[0], own_row + RING + 1)):
         apart = gap(row, block_row * BLOCK, BLOCK)
         for block_col in range(max(0, own_col - RING), min(chart.peaks.shape[1], own_col + RING + 1)):

@@ -32,31 +32,43 @@ class SweepSettings:
     """What can be set about the search.
 
     Attributes:
-        iterations: simulations a decision; None for as many as the deadline allows.
+        iterations: simulations a decision, at most; None for as many as the deadline allows.
+        patience: simulations in a row without a better plan, over the decisions, after which the plan is
+            flown without thinking, until something is seen that the plan did not expect. When the plan is
+            carried on, thinking resumes for the part of this that the plan leaves undetected.
+        least: part of the mass that was there at first, below which the plan is flown without thinking:
+            what is left lies thin and far apart, and the order of it hardly matters.
         horizon: steps that a simulation looks ahead.
         explore: c of the PUCT score.
         keep: P(a) of keeping to the plan in each node; the other actions share the rest.
         spread: loss against the plan, in parts of the expected time, at which Q is one half.
         spacing: steps between the nodes along the plan.
+        chain: probability that a tried line sweeps one more region before the rollout's rule takes over.
         overhead: steps that clearing the rest after the horizon takes per step of a search without travel.
         path: the most cells that a decision gives.
     """
 
     iterations: int | None = 4
-    horizon: int = 2500
+    patience: int = 150
+    least: float = 0.1
+    horizon: int = 4000
     explore: float = 1.0
     keep: float = 0.75
     spread: float = 0.02
     spacing: int = 32
+    chain: float = 0.5
     overhead: float = 1.25
     path: int = 64
 
     def __post_init__(self) -> None:
         if self.iterations is not None and self.iterations < 0:
             raise ValueError(f"iterations must be 0 or more, not {self.iterations}")
-        for name, least in (("horizon", 64), ("spacing", 1), ("path", 1)):
+        for name, least in (("horizon", 64), ("spacing", 1), ("path", 1), ("patience", 1)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
+        for name in ("chain", "least"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ValueError(f"{name} must be at least 0 and below 1, not {getattr(self, name)}")
         if not (0.0 < self.keep < 1.0 and self.explore >= 0.0 and self.spread > 0.0 and self.overhead >= 1.0):
             raise ValueError(
                 "keep must be between 0 and 1, explore 0 or more, spread above 0, overhead at least 1"
@@ -149,6 +161,8 @@ class SweepPlanner:
         self._belief: Belief | None = None
         self._random = np.zeros(1, dtype=np.uint64)
         self._seconds = 0.0  # of one iteration, lately
+        self._at_first = 0.0  # mass when the belief was taken over
+        self._stale = 0  # iterations since the plan got better
         self._hits = 0
         self._unseen = 0.0  # mass flown over and not reported
 
@@ -205,7 +219,7 @@ class SweepPlanner:
             stats=np.zeros((2 + s.horizon // s.spacing, 6 + regions.count, 3)),
             worths=np.zeros((2 + s.horizon // s.spacing, 1 + regions.count)),
             scores=np.zeros(1 + regions.count),
-            value=np.zeros(2),
+            value=np.zeros(3),
         )
         self._rules = self._make_rules(rows, cols, scene.ground.is_open)
         self._viewable = np.ascontiguousarray(scene.part.viewable.ravel())
@@ -223,6 +237,7 @@ class SweepPlanner:
         return plans.Rules(
             nears=nears,
             followers=len(ROLLOUT_BALANCES),
+            chain=s.chain,
             explore=s.explore,
             keep=s.keep,
             spread=s.spread,
@@ -267,17 +282,31 @@ class SweepPlanner:
         labels, home, wave = self._labels, self._home, self._wave
         if tree.mark[plans.LENGTH] - tree.mark[plans.NOW] < self.settings.horizon - 512:
             plans.extend(row, col, heading, chart, tree, rules, labels, home, self.settings.horizon, wave)
+            self._resume()
         plans.settle_root(row, col, chart, tree, rules, labels, home)
         done = 0
         most = self.settings.iterations
-        while most is None or done < most:
+        if self._has_nothing_to_think_about():
+            most = 0
+        while (most is None or done < most) and self._stale < self.settings.patience:
             before = time.perf_counter()
             if deadline_s is not None and before + self._seconds > began + deadline_s:
                 break
-            plans.iterate(row, col, heading, chart, tree, rules, labels, home, wave, self._random)
+            better = plans.iterate(row, col, heading, chart, tree, rules, labels, home, wave, self._random)
+            self._stale = 0 if better else self._stale + 1
             self._seconds = 0.9 * self._seconds + 0.1 * (time.perf_counter() - before)
             done += 1
         return self._decide(belief, scene, state.cell, done, began)
+
+    def _has_nothing_to_think_about(self) -> bool:
+        """Whether so little is left that the order in which it is searched hardly matters."""
+        return bool(self._tree.value[plans.UNDETECTED] < self.settings.least * self._at_first)
+
+    def _resume(self) -> None:
+        """Think again about a plan that was carried on, in proportion to what it leaves undetected."""
+        left, now = self._tree.value[plans.LEFT], self._tree.value[plans.UNDETECTED]
+        share = left / now if now > 0.0 else 0.0
+        self._stale = min(self._stale, int((1.0 - share) * self.settings.patience))
 
     def _follow(self, belief: Belief, cell: tuple[int, int], pose: tuple[int, int, int]) -> None:
         """Bring map and plan to where the drone is and what was seen."""
@@ -311,6 +340,7 @@ class SweepPlanner:
     def _replan(self, pose: tuple[int, int, int], pause: int) -> None:
         """Plan anew from here; see `plans.replan`."""
         self._unseen = 0.0
+        self._stale = 0
         plans.replan(
             *pose, self._chart, self._tree, self._rules, self._labels, self._home, self.settings.horizon,
             pause, self._wave,
@@ -322,7 +352,8 @@ class SweepPlanner:
         self._hits = belief.hits
         self._chart.mass[:] = np.where(self._viewable, belief.weights, 0.0)
         charts.draw_up(self._chart)
-        self._tree.value[plans.UNDETECTED] = self._chart.mass.sum()
+        self._at_first = float(self._chart.mass.sum())
+        self._tree.value[plans.UNDETECTED] = self._at_first
         self._tree.mark[:] = 0
 
     def _steps_flown(self, cell: tuple[int, int]) -> int:

@@ -12,9 +12,10 @@ import numpy as np
 import shapely
 
 from service.area.prior import cell_squares
-from service.export.gaps import find_gaps, on_earth, oriented
+from service.export.gaps import find_gaps
 from service.export.run import Find, Fix, Run
 from service.export.wishes import Wishes
+from service.shapes import on_earth
 
 _CORNERS = 48
 
@@ -65,10 +66,10 @@ def _point(lat: float, lon: float) -> shapely.Point:
 
 def _ground(run: Run) -> Iterable[Item]:
     area = run.area
-    yield Item("search", area.name, oriented(area.polygon))
+    yield Item("search", area.name, area.polygon)
     for number, exclusion in enumerate(area.exclusions, 1):
         facts = {"searchable": exclusion.searchable}
-        yield Item("exclude", f"exclusion {number}", oriented(exclusion.polygon), facts=facts)
+        yield Item("exclude", f"exclusion {number}", exclusion.polygon, facts=facts)
     yield Item("launch", "launch", _point(*run.grid.launch))
 
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from scipy import ndimage
-from shapely.geometry.polygon import orient
 
-from service.area.frame import BoolArray, GridFrame
+from service.area.frame import BoolArray
 from service.area.prior import cell_squares
 from service.export.run import Run
 from service.export.wishes import Wishes
 from service.flight import LatLon
+from service.shapes import on_earth
 
 _LEAST_M2 = 1.0
 
@@ -80,17 +80,6 @@ def find_gaps(run: Run, wishes: Wishes) -> list[Gap]:
             )
         )
     return sorted(gaps, key=lambda gap: -gap.poa)
-
-
-def on_earth(frame: GridFrame, flat: shapely.Geometry) -> shapely.Geometry:
-    """A geometry in the grid's metres (x = east, y = south) as one in degrees."""
-    return oriented(shapely.transform(flat, lambda points: frame.from_metres(points)[:, ::-1]))
-
-
-def oriented(shape: shapely.Geometry) -> shapely.Geometry:
-    """A Polygon or MultiPolygon with its outer rings counter-clockwise (RFC 7946, section 3.1.6)."""
-    parts = [orient(part) for part in shapely.get_parts(shape)]
-    return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
 
 
 def _surfaces(shape: shapely.Geometry) -> shapely.Geometry:

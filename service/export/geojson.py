@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 from typing import Any
 
-import numpy as np
 import shapely
 
 from service.export.features import Item, iso, items
 from service.export.run import Run
 from service.export.wishes import Wishes
-
-DIGITS = 7  # of a degree: a centimetre
+from service.shapes import DIGITS, collection, feature, plain, point
 
 
 def write(run: Run, wishes: Wishes) -> bytes:
@@ -27,16 +25,13 @@ def write(run: Run, wishes: Wishes) -> bytes:
         "looks": run.looks,
         "planner": run.settings.search.planner,
     }
-    collection = {
-        "type": "FeatureCollection",
-        "run": said,
-        "features": [_feature(item) for item in items(run, wishes)],
-    }
-    return json.dumps(collection, allow_nan=False).encode()
+    return json.dumps(
+        collection([_feature(item) for item in items(run, wishes)], run=said), allow_nan=False
+    ).encode()
 
 
 def _feature(item: Item) -> dict[str, Any]:
-    properties: dict[str, Any] = {"role": item.role, "name": item.name, **item.facts}
+    properties: dict[str, Any] = {"name": item.name, **item.facts}
     if item.time is not None:
         properties["time"] = iso(item.time)
     if item.shape is None:
@@ -45,7 +40,8 @@ def _feature(item: Item) -> dict[str, Any]:
         ]
         geometry: dict[str, Any] = {"type": "LineString", "coordinates": line}
         properties["times"] = [iso(fix.time) for fix in item.fixes]
+    elif isinstance(item.shape, shapely.Point):
+        geometry = point(item.shape.y, item.shape.x)
     else:
-        rounded = shapely.transform(item.shape, lambda points: np.round(points, DIGITS))
-        geometry = shapely.geometry.mapping(rounded)
-    return {"type": "Feature", "properties": properties, "geometry": geometry}
+        geometry = plain(item.shape)
+    return feature(geometry, item.role, **properties)

@@ -79,12 +79,12 @@ def draw_curve(run: Run) -> bytes:
     """POS over the minutes of the run, as a PNG."""
     figure = Figure(figsize=(7.0, 2.6), dpi=110, layout="constrained")
     axes = figure.subplots()
-    minutes = [0.0, *((time - run.began) / 60.0 for time, _ in run.curve)]
-    axes.step(minutes, [0.0, *(100.0 * pos for _, pos in run.curve)], where="post", color="#2b8cbe")
+    minutes, percent = [seconds / 60.0 for seconds, _ in run.curve], [100.0 * pos for _, pos in run.curve]
+    axes.step(minutes, percent, where="post", color="#2b8cbe")
     axes.axhline(100.0 * (1.0 - run.grid.outside), ls=":", color="grey", lw=1)
     axes.set_ylim(0, 100)
     axes.set_xlim(left=0)
-    axes.set_xlabel("minutes since the start")
+    axes.set_xlabel("minutes of searching")
     axes.set_ylabel("POS, %")
     axes.grid(alpha=0.3)
     return png(figure)

@@ -20,7 +20,6 @@ import shapely
 from roisearch.detection import DetectionRecord
 from service.area import way_home
 from service.errors import BadInput
-from service.export.gaps import on_earth
 from service.export.run import Run
 from service.export.wishes import Wishes
 from service.flight import LatLon
@@ -28,6 +27,7 @@ from service.foresight import foresee
 from service.navigator import Cell, straight_part
 from service.pace import climb_seconds, leg_seconds
 from service.search import Search
+from service.shapes import on_earth
 
 log = logging.getLogger("roisearch")
 MOST_WAYPOINTS = 480

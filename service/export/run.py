@@ -20,14 +20,15 @@ from roisearch import Belief
 from service.area import Grid, SearchArea
 from service.area.frame import GridFrame
 from service.config import Settings
+from service.curve import PosCurve
 from service.errors import BadInput
 from service.evidence import Observation
 from service.flight import LatLon
-from service.journal import Row, read_meta, read_rows
-from service.resume import retrace, stored_settings
+from service.journal import Row
+from service.resume import retrace, stored_run
 from service.search import Search
 from service.states import FINAL, Event, State
-from service.survey import AREA, JOURNAL, PRIOR, survey
+from service.survey import JOURNAL
 from service.suspects import IN_95_PERCENT
 from service.verdict import ROW as VERDICT
 
@@ -93,7 +94,7 @@ class Run:
         belief: after all that was reported.
         pod: cumulative probability of detection, cell by cell.
         labels: regions of interest, 0 for none.
-        pos: probability of success so far; `curve` is (time, pos) after each report that said something.
+        pos: probability of success so far; `curve` is (seconds of searching, pos).
         track: the flight in unbroken pieces.
         hits: centres of the cells that had a hit, in order.
         autopilot: "px4" or "ardupilot", as it said when it was linked; empty before.
@@ -172,26 +173,18 @@ class Run:
 
 def read_run(folder: Path) -> Run:
     """Read a run from its folder, whether it is under way or over. Raises BadInput."""
-    journal = folder / JOURNAL
-    settings = stored_settings(journal, {})
-    prior = folder / PRIOR
-    area, grid = survey(folder / AREA, prior if prior.exists() else None, settings)
-    if read_meta(journal, "grid") != grid.frame.to_dict():
-        raise BadInput(
-            f"{folder}: its journal is of another grid than its area file makes; export it unchanged"
-        )
-    rows = list(read_rows(journal))
-    if not rows:
-        raise BadInput(f"{folder}: its journal has nothing in it yet; wait until the search has begun")
+    settings, area, grid, rows = stored_run(folder)
     search = Search(grid, settings)
-    curve = []
+    curve = PosCurve()
     for row in rows:
         try:
             retrace(row, search)
         except (KeyError, TypeError, ValueError, IndexError) as error:
-            raise BadInput(f"{journal}: row {row.seq} is no {row.kind} that is known ({error})") from error
+            raise BadInput(
+                f"{folder / JOURNAL}: row {row.seq} is no {row.kind} that is known ({error})"
+            ) from error
         if row.kind == "report" and row.body["observation"] is not None:
-            curve.append((row.time, search.record.pos))
+            curve.add(row.time, search.record.pos)
     reports = [row for row in rows if row.kind == "report"]
     return Run(
         name=folder.resolve().name,
@@ -204,7 +197,7 @@ def read_run(folder: Path) -> Run:
         pos=search.record.pos,
         looks=search.record.looks,
         reports=len(reports),
-        curve=tuple(curve),
+        curve=tuple(curve.points),
         track=_pieces(fix for row in reports for fix in _fix(row)),
         hits=_hits(grid.frame, reports),
         detections=tuple(each for row in reports for each in _detections(row)),

@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from service.errors import BadInput
+from service.errors import BadInput, shown
 
 _EXAMPLES = (
     "udpin://0.0.0.0:14540, udpout://HOST:PORT, tcpin://HOST:PORT, tcpout://HOST:PORT "
@@ -58,7 +58,7 @@ def parse_url(text: str) -> LinkUrl:
     """
 
     def bad(why: str) -> BadInput:
-        return BadInput(f"cannot use the link address {text!r}: {why}; right would be {_EXAMPLES}")
+        return BadInput(f"cannot use the link address {shown(text)}: {why}; right would be {_EXAMPLES}")
 
     scheme, colon, rest = text.strip().partition(":")
     if not colon:
@@ -66,14 +66,14 @@ def parse_url(text: str) -> LinkUrl:
     kind = _SCHEMES.get(scheme.lower())
     if kind is None:
         hint = ", say udpin or udpout" if scheme.lower() == "udp" else ""
-        raise bad(f"{scheme!r} is not a kind of link{hint}")
+        raise bad(f"{shown(scheme)} is not a kind of link{hint}")
     rest = rest.removeprefix("//")
     address, colon, number_text = rest.rpartition(":")
     what = "baud rate" if kind is LinkKind.SERIAL else "port"
     if not colon or not number_text:
         raise bad(f"it has no {what} at the end")
     if not (number_text.isascii() and number_text.isdigit() and len(number_text) <= 9):
-        raise bad(f"{number_text!r} is not a {what}")
+        raise bad(f"{shown(number_text)} is not a {what}")
     number = int(number_text)
     if kind is not LinkKind.SERIAL:
         address = address.removeprefix("[").removesuffix("]")

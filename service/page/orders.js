@@ -1,6 +1,6 @@
 // Orders: what moves the aircraft is asked twice, except to stop, which must not wait.
 
-import { ask, order } from "./link.js";
+import { order } from "./link.js";
 import { $, make, say } from "./panel.js";
 import { percent } from "./cells.js";
 
@@ -61,7 +61,7 @@ export function showSuspects(state, mayOrder, onShow) {
   const suspects = state.suspects ?? [], list = $("suspects"), card = $("suspects-card");
   card.hidden = !suspects.length && !state.found;
   say($("suspects-title"), state.found ? "Found" : "Detections");
-  const wanted = JSON.stringify([suspects.map((each) => [key(each), !!each.thumbnail]), state.found, mayOrder]);
+  const wanted = JSON.stringify([suspects.map((each) => [key(each), each.thumbnail]), state.found, mayOrder]);
   if (list.dataset.shown !== wanted) {
     list.dataset.shown = wanted;
     list.replaceChildren(...(state.found ? [foundItem(state.found)] : suspects.map((each) => suspectItem(each, mayOrder, onShow))));
@@ -75,12 +75,11 @@ export function showSuspects(state, mayOrder, onShow) {
 
 function foundItem(found) {
   const where = found.ellipse ? `, within ${Math.round(found.ellipse.semi_major_m)} m by ${Math.round(found.ellipse.semi_minor_m)} m` : "";
-  return make("li", {}, make("strong", { textContent: key(found) }), make("span", { className: "where", textContent: `${(100 * found.probability).toFixed(1)} % sure${where}` }));
+  return make("li", {}, make("strong", { textContent: key(found) }), make("span", { className: "where", textContent: `${(100 * found.probability).toFixed(1)} % sure${where}` }), ...(found.thumbnail ? [picture(found.thumbnail)] : []));
 }
 
 function suspectItem(each, mayOrder, onShow) {
   const item = make("li", {});
-  if (each.thumbnail) item.append(picture(each.thumbnail));
   item.append(make("strong", { className: "sure" }), make("span", { className: "where", textContent: key(each) }));
   const show = make("button", { type: "button", textContent: "Show" });
   show.addEventListener("click", () => onShow(each));
@@ -92,20 +91,12 @@ function suspectItem(each, mayOrder, onShow) {
     reject.addEventListener("click", () => give("reject", { lat: each.lat, lon: each.lon }));
     buttons.push(confirm, reject);
   }
+  if (each.thumbnail) item.append(picture(each.thumbnail));
   item.append(make("div", { className: "verdict" }, ...buttons));
   return item;
 }
 
-/** What the detector gave as a picture: the image itself, or an address elsewhere, which only a click asks. */
-function picture(thumbnail) {
-  if (/^https?:/.test(thumbnail))
-    return make("a", { href: thumbnail, target: "_blank", rel: "noreferrer", textContent: "Picture" });
-  const image = make("img", { alt: "what the camera saw" });
-  if (thumbnail.startsWith("data:image/")) image.src = thumbnail;
-  else if (thumbnail.startsWith("/"))
-    ask(thumbnail)
-      .then(async (answer) => (image.src = URL.createObjectURL(await answer.blob())))
-      .catch(() => image.remove());
-  else return "";
-  return image;
+/** The address of the detector's picture: elsewhere, so only a click asks for it. */
+function picture(address) {
+  return make("a", { href: address, target: "_blank", rel: "noreferrer", textContent: "Picture" });
 }

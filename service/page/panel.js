@@ -76,7 +76,7 @@ export function showCurve(run) {
 const digits = (value) => (Math.abs(value) >= 100 ? value.toFixed(0) : value.toPrecision(3));
 
 export function showNext({ reason, options, state }) {
-  const done = ["DONE", "ABORTED", "RETURNING"].includes(state);
+  const done = ["FOUND", "RETURNING", "DONE", "ABORTED"].includes(state);
   say($("reason"), done ? "nothing more to search" : reason);
   const shown = done ? [] : options.slice(0, 6);
   $("options").hidden = !shown.length;

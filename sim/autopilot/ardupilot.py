@@ -89,6 +89,7 @@ class ArduCopter(Firmware):
     reboot_refusal, pilot_mode = FAILED, "LOITER"
     target_fields = (M.MAV_FRAME_GLOBAL, 65016, False)
     cells = 3
+    critical_battery = ("BATT_FS_CRT_ACT", {"warn": 0.0, "land": 1.0, "return": 2.0})
     vtol_state = M.MAV_VTOL_STATE_MC
     position_error_m, velocity_error_mps = 0.05, 0.02
     landing_takes_s, disarm_after_landing_s = 1.6, 0.5

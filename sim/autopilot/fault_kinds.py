@@ -22,12 +22,13 @@ def _nothing(autopilot: Autopilot, options: Options) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind; `options` are what it can be told, with the defaults."""
+    """One kind; `options` are what it can be told, with the defaults, `choices` what some of them may be."""
 
     begin: Act
     options: Options = field(default_factory=dict)
     step: Act | None = None
     end: Act | None = None
+    choices: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 # ---- the link
@@ -110,6 +111,12 @@ def _battery(a: Autopilot, options: Options) -> None:
     a.vehicle.battery.charge = min(max(options["percent"] / 100.0, 0.0), 1.0)
 
 
+def _battery_critical(a: Autopilot, options: Options) -> None:
+    parameter, actions = a.firmware.critical_battery
+    a.firmware.parameters.set(parameter, actions[options["action"]])
+    _battery(a, options)
+
+
 def _wind(a: Autopilot, options: Options) -> None:
     a.vehicle.wind = Wind((options["north"], options["east"]), options["gust"], a.chance)
 
@@ -187,6 +194,11 @@ KINDS: dict[str, Kind] = {
     "gps_jump": Kind(_gps_jump, {"north": 30.0, "east": 0.0}, end=_gps_jump_back),
     "ekf_bad": Kind(_ekf_bad, end=_ekf_good),
     "battery": Kind(_battery, {"percent": 10.0}),
+    "battery_critical": Kind(
+        _battery_critical,
+        {"percent": 6.0, "action": "return"},  # below both autopilots' critical level
+        choices={"action": ("return", "land", "warn")},
+    ),
     "wind": Kind(_wind, {"north": 0.0, "east": 20.0, "gust": 0.0}, end=_calm),
     "reboot": Kind(_reboot),
     "pilot": Kind(_pilot, _STICKS, step=_pilot_sticks, end=_pilot_lets_go),

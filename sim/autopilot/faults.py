@@ -52,6 +52,9 @@ class Fault:
                 times[key] = float(_checked(kind, key, value, 0.0))
             elif key in defaults:
                 options[key] = _checked(kind, key, value, defaults[key])
+                choices = KINDS[kind].choices.get(key)
+                if choices is not None and value not in choices:
+                    raise ValueError(f"'{key}' of a fault of kind '{kind}' is one of {', '.join(choices)}")
             else:
                 known = ", ".join([*defaults, *_TIMES])
                 raise ValueError(f"a fault of kind '{kind}' has no '{key}'; it has: {known}")

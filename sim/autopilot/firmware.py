@@ -66,6 +66,7 @@ class Firmware(ABC):
     pilot_mode: ClassVar[str]  # the mode a pilot takes over with
     target_fields: ClassVar[tuple[int, int, bool]]  # POSITION_TARGET: frame, type mask, silent on the ground
     cells: ClassVar[int]  # battery
+    critical_battery: ClassVar[tuple[str, dict[str, float]]]  # the parameter, and its values by action
     position_error_m: ClassVar[float]
     velocity_error_mps: ClassVar[float]
     vtol_state: ClassVar[int] = 0

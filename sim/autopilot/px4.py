@@ -90,6 +90,7 @@ class Px4(Firmware):
     reboot_refusal, pilot_mode = REJECTED, "POSCTL"
     target_fields = (M.MAV_FRAME_GLOBAL_INT, 0, True)
     cells = 4
+    critical_battery = ("COM_LOW_BAT_ACT", {"warn": 0.0, "land": 2.0, "return": 3.0})
     position_error_m, velocity_error_mps = 0.45, 0.06
     landing_takes_s, disarm_after_landing_s = 1.0, 2.0
     home_share = 0.2

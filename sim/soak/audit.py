@@ -16,6 +16,7 @@ from roisearch import Belief
 from service.area import build_grid, read_area  # the search starts from the prior that the service lays
 from sim.soak import ground
 
+_MAY_STOP = {"HOLDING", "FOUND", "CONFIRMING"}  # the last for another look at a suspect
 _MAY_MOVE = {"TAKEOFF", "SEARCHING", "CONFIRMING", "RETURNING"}
 Told = tuple[int, str]
 """What the door told at one moment: how many reports were in, and the belief's digest."""
@@ -81,7 +82,7 @@ def _moves(rows: list[Row]) -> list[str]:
         elif row.kind == "command":
             command = row.body["command"]
             stops += command == "hold"
-            if command == "hold" and (state != "HOLDING" or stops > 1):
+            if command == "hold" and (state not in _MAY_STOP or (stops > 1 and state != "CONFIRMING")):
                 found.append(f"row {row.seq}: stop {stops} in {state}")
             elif command == "reposition" and state not in _MAY_MOVE:
                 found.append(f"row {row.seq}: a waypoint in {state}")

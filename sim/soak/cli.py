@@ -6,12 +6,15 @@ Flight k of seed S is flight 0 of seed S + k: `--flights 1 --seed N` flies a vio
 from __future__ import annotations
 
 import argparse
+import os
+import signal
 import tempfile
 import threading
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import FrameType
 
 from rich.console import Console
 from rich.table import Table
@@ -19,6 +22,7 @@ from rich.table import Table
 from sim.soak import ground
 from sim.soak.flight import Flight, Outcome
 from sim.soak.plan import draw_plan
+from sim.soak.process import Process
 
 
 class Soak:
@@ -85,6 +89,13 @@ def report(outcomes: list[Outcome]) -> Table:
     return shown
 
 
+def _leave_nothing_behind(number: int, frame: FrameType | None) -> None:
+    """A service that is told to end flies home first, and here is nobody left to fly for."""
+    for process in tuple(Process.running):
+        process.process.kill()
+    os._exit(128 + number)
+
+
 def main(arguments: list[str]) -> int:
     """The command line; exits 0 without a violation, else 1."""
     parser = argparse.ArgumentParser(prog="roisearch-sim soak", description=__doc__.split("\n")[0])
@@ -102,6 +113,7 @@ def main(arguments: list[str]) -> int:
     )
     options = parser.parse_args(arguments)
     console = Console()
+    signal.signal(signal.SIGTERM, _leave_nothing_behind)
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
         soak = Soak(options, options.out or Path(scratch), console)
         for job in [pool.submit(soak.work) for _ in range(options.jobs)]:

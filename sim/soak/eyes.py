@@ -106,4 +106,5 @@ class Eyes:
             if line.startswith("roisearch_tasks "):
                 self.tasks.append(int(float(line.split()[1])))
         status = Path(f"/proc/{self._pid}/status").read_text(encoding="ascii")
-        self.memory_mb.append(int(status.partition("VmRSS:")[2].split()[0]) / 1024.0)
+        if resident := status.partition("VmRSS:")[2].split():  # a process that is ending has none
+            self.memory_mb.append(int(resident[0]) / 1024.0)

@@ -3,8 +3,10 @@ after each, and everything watched."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
+import subprocess
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -171,8 +173,7 @@ class Flight:
 
     def _kill(self) -> None:
         """kill -9 and --resume: what was told before must still hold, and what was acknowledged be there."""
-        self._service.process.kill()
-        self._service.process.wait()
+        self._service.stop()
         self._look_away()
         self.outcome.said += self._service.said
         if not self._alive_runs():
@@ -236,9 +237,14 @@ class Flight:
         try:
             httpx.post(f"{self._url}/api/commands", json={"command": command}, timeout=40.0)
         except httpx.HTTPError as error:
+            self._wait_for_the_end(5.0)  # an order that comes when the run ends finds the door shut
             if self._service.process.poll() is None:
                 raise Trouble(f"the order '{command}' was not taken: {error}") from error
         self.judge.ordered(time.monotonic())
+
+    def _wait_for_the_end(self, patience_s: float) -> None:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._service.process.wait(patience_s)
 
     def _pass(self, seconds: float) -> None:
         """Let so much vehicle time pass, or the flight end."""
@@ -286,6 +292,10 @@ def _grown(eyes: Eyes) -> list[str]:
         )
         if end - middle > max(_GROWTH_MB, _GROWTH_PART * middle):
             found.append(f"memory has grown from {middle:.0f} to {end:.0f} MB")
-    if eyes.tasks and max(eyes.tasks) > _MOST_TASKS:
+    if eyes.memory_mb and not max(eyes.tasks, default=0):
+        found.append("the number of tasks is not told")
+    if max(eyes.tasks, default=0) > _MOST_TASKS:
         found.append(f"{max(eyes.tasks)} tasks at a time")
+    if third >= 10 and eyes.tasks and min(eyes.tasks[-third:]) > max(eyes.tasks[third:-third]):
+        found.append(f"tasks have grown from {max(eyes.tasks[third:-third])} to {min(eyes.tasks[-third:])}")
     return found

@@ -26,8 +26,9 @@ _NEAR_M = 60.0  # a stop lies this far ahead at most
 _GUIDED = {"px4": 4 << 16 | 3 << 24, "ardupilot": 4}
 
 _FLY = {"SEARCHING", "CONFIRMING", "RETURNING"}
+_HOVER = {"HOLDING", "FOUND"}  # one stop, at the beginning
 _ALLOWED: dict[str, set[str]] = {
-    "MAV_CMD_DO_REPOSITION": _FLY | {"HOLDING"},
+    "MAV_CMD_DO_REPOSITION": _FLY | _HOVER,
     "MAV_CMD_DO_CHANGE_SPEED": {"SEARCHING", "CONFIRMING"},
     "MAV_CMD_NAV_RETURN_TO_LAUNCH": {"RETURNING"},
     "MAV_CMD_COMPONENT_ARM_DISARM": {"TAKEOFF"},
@@ -79,7 +80,7 @@ class Judge:
             return
         self._not_guided_since = min(self._not_guided_since, now)
         ours = now - max(self._sent_away_at, self._ordered_at) < _ORDER_S
-        if self.state in _FLY | {"HOLDING", "FOUND"} and not ours:
+        if self.state in _FLY | _HOVER and not ours:
             self._taken_at = min(self._taken_at, now)
 
     def from_service(self, message: Any, now: float) -> None:
@@ -116,9 +117,9 @@ class Judge:
         found = []
         if now - self._not_guided_since > self._late_s:
             found.append(f"the mode has not been the guided one for {now - self._not_guided_since:.2f} s")
-        if self.state == "HOLDING":
+        if self.state in _HOVER:
             if self._stop is not None and self._stop != there:
-                found.append("a second stop in one hold")
+                found.append("a second stop in one hover")
             self._stop = there
             if self._positions and min(_distance(here, there) for here in self._positions) > _NEAR_M:
                 found.append("a stop far away")

@@ -9,12 +9,16 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import ClassVar
 
 ROOT = Path(__file__).parents[2]
 
 
 class Process:
     """`python -m words`; everything it says, on both its outputs, is kept in `said`."""
+
+    running: ClassVar[set[Process]] = set()
+    """All that were started and not stopped yet."""
 
     def __init__(self, words: Sequence[str]) -> None:
         self.process = subprocess.Popen(
@@ -25,6 +29,7 @@ class Process:
             stderr=subprocess.STDOUT,
             text=True,
         )
+        self.running.add(self)
         self.said = ""
         self._more = threading.Condition()
         threading.Thread(target=self._read, daemon=True).start()
@@ -61,3 +66,4 @@ class Process:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
+        self.running.discard(self)

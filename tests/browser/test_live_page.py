@@ -10,8 +10,11 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, WebSocket, expect
+
+from service.area.frame import GridFrame
 
 from .stage import PATIENCE_MS, Stage, Watch, searching
 
@@ -135,6 +138,41 @@ def test_hold_stops_the_aircraft_and_resume_asks_first(watch: Watch, stage: Stag
     while stage.control.state()["speed"] < 1.0:
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+def test_a_rejected_detection_lowers_the_map_there(watch: Watch, stage: Stage) -> None:
+    page = watch.page
+    searching(watch)
+    stage.door.post("/api/commands", json={"command": "hold"})  # nobody else is to change the map there
+    watch.shows("HOLDING")
+    grid = stage.door.get("/api/map").json()
+    frame = GridFrame.from_dict(grid["frame"])
+    left = np.array(grid["probability"], dtype=float)  # null is nan
+    row, col = (int(i) for i in np.unravel_index(np.nanargmax(left), left.shape))
+    lat, lon = frame.to_latlon([(row, col)])[0].tolist()
+    seen = {"lat": lat, "lon": lon, "score": 0.9, "thumbnail": "https://camera.example/1.jpg"}
+    pose = {"lat": lat, "lon": lon, "height_m": 30.0, "heading_deg": 0.0}
+    report = {"id": "test-1", "source": "test", "captured_at": stage.state()["time"] - 1.0, "pose": pose}
+    receipt = stage.door.post("/api/reports", json={**report, "detections": [seen]}).json()[0]
+    assert receipt["hits"] == 1, receipt
+    expect(page.locator("#suspects-card")).to_be_visible()
+    item = page.locator("#suspects li").filter(has=page.get_by_role("link", name="Picture"))
+    expect(item).to_contain_text("sure")
+    expect(item.get_by_role("link", name="Picture")).to_have_attribute("href", seen["thumbnail"])
+    assert watch.violations() == []
+    before, shown = probability(stage, row, col), watch.cell(row, col)
+    item.get_by_role("button", name="Reject").click()
+    page.get_by_role("dialog").get_by_role("button", name="Reject").click()
+    expect(page.locator("#toast")).to_contain_text("reject:")
+    expect(item).to_have_count(0)
+    assert probability(stage, row, col) < before / 10
+    assert watch.cell(row, col) < shown, "the map on the page is paler there"
+
+
+def probability(stage: Stage, row: int, col: int) -> float:
+    """The probability of a cell, as the service tells it."""
+    cell: float = stage.door.get("/api/map").json()["probability"][row][col]
+    return cell
 
 
 def focused(page: Page) -> str:

@@ -21,8 +21,6 @@ from tests.integration.flight import FIELD, running, service_words, write_area
 SPEEDUP = 10.0
 TARGET = "47.0508,8.3017"
 SETTINGS = """
-[link]
-{link}
 [flight]
 altitude_m = 15
 settle_s = {settle_s}
@@ -135,7 +133,6 @@ def flight(
     settle_s: float = 3.0,
     margin_m: float = 30.0,
     module: str = "service",
-    link: str = "",
     target: str | None = None,
     options: tuple[str, ...] = (),
 ) -> Iterator[Scene]:
@@ -147,7 +144,7 @@ def flight(
         control = stack.enter_context(Control(autopilot.control))
         tap = stack.enter_context(Tap(autopilot.port))
         file = folder / "settings.toml"
-        file.write_text(SETTINGS.format(link=link, settle_s=settle_s, margin_m=margin_m), encoding="utf-8")
+        file.write_text(SETTINGS.format(settle_s=settle_s, margin_m=margin_m), encoding="utf-8")
         area = write_area(folder, FIELD if target else plain(FIELD))
         runs = folder / "runs"
         words = service_words(area, runs, "--connect", tap.url, "--takeoff", "--config", str(file))

@@ -1,4 +1,5 @@
-"""The service, with an event loop that stands still for five seconds at SIGUSR1; run it with `python -m`."""
+"""The service with two switches, run with `python -m`: its event loop stands still for five seconds at SIGUSR1, and
+there is a mistake in its mission from SIGUSR2 on."""
 
 import signal
 import sys
@@ -6,6 +7,7 @@ import time
 from types import FrameType
 
 from service.cli import main
+from service.mission import Mission
 
 STALL_S = 5.0
 
@@ -16,6 +18,16 @@ def stand_still(number: int, frame: FrameType | None) -> None:
     time.sleep(STALL_S)
 
 
+def go_wrong(number: int, frame: FrameType | None) -> None:
+    """From now on the mission runs into a mistake that nobody has thought of."""
+
+    async def steer(self: Mission) -> None:
+        raise ZeroDivisionError("a mistake")
+
+    Mission._steer = steer  # type: ignore[method-assign]
+
+
 if __name__ == "__main__":
     signal.signal(signal.SIGUSR1, stand_still)
+    signal.signal(signal.SIGUSR2, go_wrong)
     sys.exit(main())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,26 @@ def test_a_low_battery_flies_home_and_says_so(tmp_path: Path) -> None:
         code, report = scene.ends()
     assert code == 3
     assert "battery" in report["stopped_because"]
+
+
+@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
+def test_a_critical_battery_that_the_autopilot_flies_home_with_is_not_steered_against(
+    flavor: str, tmp_path: Path
+) -> None:
+    with flight(tmp_path, flavor) as scene:
+        scene.searching()
+        scene.control.fault("battery_critical")
+        deadline = time.monotonic() + 60.0
+        while "RTL" not in scene.control.state()["mode"]:
+            assert time.monotonic() < deadline, scene.service.said
+            time.sleep(0.02)
+        time.sleep(0.5)  # what was on its way
+        before = len(scene.tap.motions)
+        code, report = scene.ends()
+        assert "MAV_CMD_DO_REPOSITION" not in [name for _, name in scene.tap.motions[before:]]
+        assert not scene.control.state()["armed"]
+    assert code in (3, 4)  # its own return, for the battery that it read, or the autopilot's
+    assert "attery" in report["stopped_because"]
 
 
 def test_it_flies_home_while_the_battery_has_what_that_needs(tmp_path: Path) -> None:

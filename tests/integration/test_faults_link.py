@@ -21,15 +21,6 @@ def test_a_silent_autopilot_is_waited_for_and_nothing_is_sent_blindly(tmp_path: 
         scene.moves_again()
 
 
-def test_after_a_silence_it_flies_home_when_the_settings_say_so(tmp_path: Path) -> None:
-    with flight(tmp_path, link='after_silence = "return"') as scene:
-        scene.searching()
-        scene.control.fault("link_lost", seconds=40.0)
-        scene.reaches("RETURNING", "the autopilot is heard again")
-        code, report = scene.ends()
-    assert (code, report["stopped_because"]) == (4, "the autopilot was silent")
-
-
 @pytest.mark.parametrize(
     ("flavor", "trouble"),
     [

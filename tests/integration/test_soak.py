@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from service.area import build_grid, read_area
 from service.journal import Journal
 from sim.soak import ground
 from sim.soak.audit import audit
+from sim.soak.flight import _grown
 from sim.soak.judge import Judge
 from sim.soak.plan import KINDS, draw_plan
 from tests.integration.flight import REPOSITORY
@@ -25,7 +27,7 @@ PX4_HOLD, PX4_POSCTL = 4 << 16 | 3 << 24, 3 << 16
 
 
 def test_a_short_soak_ends_without_a_violation() -> None:
-    words = ["soak", "--flights", "2", "--seed", "1", "--faults", "5", "--jobs", "2"]
+    words = ["soak", "--flights", "2", "--seed", "1", "--faults", "4", "--jobs", "2"]
     done = subprocess.run(
         [sys.executable, "-m", "sim", *words, "--verbose"], cwd=REPOSITORY, capture_output=True, text=True
     )
@@ -106,7 +108,7 @@ def test_the_judge_lets_a_search_be() -> None:
     assert wire.goes(130.0, 20.0) == []
 
 
-@pytest.mark.parametrize("state", ["READY", "FOUND", "YIELDED", "DONE"])
+@pytest.mark.parametrize("state", ["READY", "TAKEOFF", "YIELDED", "DONE"])
 def test_the_judge_sees_motion_in_a_state_that_may_not_move(state: str) -> None:
     wire = Wire()
     wire.state(state)
@@ -186,3 +188,21 @@ def test_the_audit_sees_what_is_lost_doubled_or_does_not_add_up(tmp_path: Path) 
     journal._database.execute("DELETE FROM events WHERE seq = 3")
     assert "rows are missing" in audit(tmp_path, {"a"}, [])[0]
     journal.close()
+
+
+# ---- the eye on the process
+
+
+@pytest.mark.parametrize(
+    ("memory", "tasks", "words"),
+    [
+        ([200.0] * 60, [20] * 60, ""),
+        ([200.0] * 40 + [300.0] * 20, [20] * 60, "memory has grown from 200 to 300 MB"),
+        ([200.0] * 60, [20] * 40 + [25] * 20, "tasks have grown from 20 to 25"),
+        ([200.0] * 60, [90] * 60, "90 tasks at a time"),
+        ([200.0] * 60, [], "the number of tasks is not told"),
+    ],
+)
+def test_growth_is_seen(memory: list[float], tasks: list[int], words: str) -> None:
+    eyes: Any = SimpleNamespace(memory_mb=memory, tasks=tasks)
+    assert "; ".join(_grown(eyes)) == words

@@ -191,3 +191,30 @@ def test_alternatives_say_what_was_thought_of_each_region() -> None:
     assert regions == {1, 2}
     best = max(decision.alternatives, key=lambda alternative: alternative.value)
     assert best.value == pytest.approx(decision.value)
+
+
+def test_thinking_rests_when_the_plan_gets_no_better_and_a_hit_wakes_it() -> None:
+    belief, rng = Belief(hill((40, 40), (20, 25), 4.0)), np.random.default_rng(0)
+    planner = SweepPlanner(SweepSettings(iterations=20, patience=30, horizon=1500), fov=FOVS["point"])
+    state, thought = SearchState((20, 20)), []
+    for _ in range(60):
+        decision = planner.plan(belief, state, rng)
+        thought.append(decision.effort.iterations)
+        if thought[-1] == 0:
+            break
+        state = after(state, decision.path[0])
+        belief.observe([state.cell], False, 0.9, 0.9)
+    assert thought[0] == 20
+    assert thought[-1] == 0
+    belief.observe([state.cell], True, 0.9, 0.9)
+    assert planner.plan(belief, state, rng).effort.iterations == 20
+
+
+def test_what_is_left_of_a_searched_map_is_not_thought_about() -> None:
+    prior = hill((40, 40), (20, 25), 4.0)
+    belief, rng = Belief(prior), np.random.default_rng(0)
+    planner = SweepPlanner(SweepSettings(iterations=5, least=0.5, horizon=300), fov=FOVS["point"])
+    state = SearchState((20, 20))
+    assert planner.plan(belief, state, rng).effort.iterations == 5
+    belief.observe(np.argwhere(prior > 0.1), False, 0.99, 0.9)
+    assert planner.plan(belief, state, rng).effort.iterations == 0

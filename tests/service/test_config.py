@@ -47,6 +47,8 @@ def test_flags_win_over_environment_and_environment_over_file(tmp_path: Path) ->
             ["sensor.profile", "fisheye", "'wide-angle' or 'camera'"],
         ),
         ("[sensor\n", ["is not TOML", "line 1"]),
+        ("[flight]\naltitude_m = 150\n", ["flight.altitude_m", "150", "max_height_m = 120"]),
+        ("[flight]\nmin_height_m = 40\n", ["flight.altitude_m", "30", "min_height_m = 40"]),
     ],
 )
 def test_a_wrong_setting_is_named_with_what_is_allowed(tmp_path: Path, text: str, words: list[str]) -> None:
@@ -124,3 +126,11 @@ def test_config_check_tells_where_each_setting_comes_from(
     assert "did you mean ROISEARCH_RUN_SEED?" in said.err
     assert main(["show"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == len(KNOWN_KEYS)
+
+
+def test_a_wrong_value_as_long_as_a_file_is_shown_by_its_beginning(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text("[link]\nsystem_id = '" + "x" * 5000 + "'\n")
+    with pytest.raises(BadInput, match=r"link\.system_id") as caught:
+        read_settings(file, environment={})
+    assert len(str(caught.value)) < 400

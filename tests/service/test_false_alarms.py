@@ -39,7 +39,7 @@ def fly(grid: Grid, seed: int, *, frames: int = 2, one_look_per_pass: bool = Tru
     """One search with so many frames of each cell flown over: for each level that was passed, whether the place was
     right when it was passed first."""
     search, frame = Search(grid, SETTINGS), grid.frame
-    sensor, passes = make_sensor(SETTINGS, grid, search.fov), Passes()
+    sensor, passes = make_sensor(SETTINGS, grid), Passes()
     target = draw(grid, seed)
     goal = frame.to_cells([target])[0]
     detector = Detector(target, SETTINGS.sensor.p_tp, SETTINGS.sensor.p_tn, seed)

@@ -41,6 +41,14 @@ def test_the_way_may_cross_the_hull_of_area_launch_and_exclusions_and_no_more() 
     assert "lies outside the way" in FENCE.leg_objection((50.0, 50.0), (380.0, 50.0), on_way=True)
 
 
+def test_the_way_may_go_around_what_stands_behind_an_exclusion() -> None:
+    behind = shapely.box(470, 200, 520, 260)
+    both = Fence.around(ELL, [(150.0, 250.0)], shapely.union_all([BLOCK, behind]), 10.0, 20.0)
+    around = ((150.0, 250.0), (530.0, 230.0))
+    assert both.leg_objection(*around, on_way=True) == ""
+    assert FENCE.leg_objection(*around, on_way=True) != ""
+
+
 def test_from_outside_a_leg_may_only_lead_in() -> None:
     assert FENCE.leg_objection((-80.0, 50.0), (50.0, 50.0), on_way=False) == ""
     assert FENCE.leg_objection((-80.0, 50.0), (-60.0, 50.0), on_way=False) != ""

@@ -14,7 +14,7 @@ from service.journal import read_rows
 from service.resume import replay, retrace
 from tests.service.reporting import Ground, intake, report, run
 
-KILLS = 12
+KILLS = 8
 
 
 @pytest.fixture(scope="module")

@@ -112,7 +112,7 @@ def intake_for(search: Search, journal: Path) -> Iterator[Intake]:
         return Pose(float(lat), float(lon), 30.0, 0.0, moment)
 
     with closing(Journal(journal)) as opened:
-        sensor = make_sensor(SETTINGS, search.grid, search.fov)
+        sensor = make_sensor(SETTINGS, search.grid)
         yield Intake(search, sensor, opened, Clock(), over, lambda *_: None, history_s=1e12)
 
 

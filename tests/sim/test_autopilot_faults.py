@@ -195,6 +195,17 @@ def test_critical_battery_comes_home_when_the_parameter_says_so(
     assert flight.mode == RETURN[flavor]
 
 
+@pytest.mark.parametrize("action", ["return", "land", "warn"])
+def test_critical_battery_is_answered_as_it_was_told(flight: Flight, action: str) -> None:
+    before = flight.mode
+    flight.fault("battery_critical", action=action)
+    flight.listen(2.0)
+    assert flight.said("Critical battery" if flight.px4 else "Battery 1 is critical")
+    assert flight.status.battery_remaining == 6
+    modes = {"return": RETURN[flight.flavor], "land": LAND[flight.flavor], "warn": before}
+    assert flight.mode == modes[action]
+
+
 def test_empty_battery_stops_the_motors(flight: Flight) -> None:
     flight.fault("battery", percent=0.0)
     flight.listen(6.0)
@@ -349,6 +360,7 @@ def test_file_of_faults_comes_at_its_times(tmp_path: Path) -> None:
         ('[[fault]]\nkind = "gremlins"', "no fault of kind 'gremlins'"),
         ('[[fault]]\nkind = "battery"\nvolts = 3.0', "has no 'volts'"),
         ('[[fault]]\nkind = "battery"\npercent = "low"', "'percent'"),
+        ('[[fault]]\nkind = "battery_critical"\naction = "pray"', "is one of return, land, warn"),
         ("[[fault]", "faults.toml"),
     ],
 )

@@ -60,6 +60,16 @@ def test_a_better_view_in_the_same_pass_finds_as_many_as_it_would_alone() -> Non
     assert better / 2000 == pytest.approx(0.9, abs=0.03)
 
 
+def test_a_cell_that_stays_in_view_is_looked_at_anew_after_the_time_that_was_set() -> None:
+    detector = Detector((0.4, 0.4), 0.5, 0.5, seed=1, again_s=10.0)
+    verdicts = []
+    for second in range(400):
+        seen = {**state(0), "pose": {"time": float(second)}}
+        verdicts.append(bool(detector.frame(seen)["detections"]))
+    assert all(len(set(verdicts[i : i + 10])) == 1 for i in range(0, 400, 10))
+    assert 10 <= sum(verdicts[::10]) <= 30
+
+
 def test_a_frame_between_cells_reports_that_nothing_was_seen() -> None:
     detector = Detector((0.4, 0.4), 1.0, 0.5, seed=1)
     assert detector.frame(state(0, counts=False))["detections"] == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pyproj
 import pytest
 
 from roisearch import Belief, FieldOfView
@@ -16,7 +17,7 @@ from service.camera.sensor import CameraSensor, Mount
 from service.config import Settings
 from service.evidence import Pose, Sensor, Unreadable, observe
 from service.passes import Passes
-from service.reports import Report
+from service.reports import Gimbal, Report
 from service.sensors import camera_sensor, cell_size, field_of_view
 
 CAMERA = Pinhole.of_angles(1920, 1080, 70.0)
@@ -248,3 +249,17 @@ def test_a_score_has_the_likelihood_ratio_of_the_calibration() -> None:
     strict = calibrated.read(pose(15, 15), report(threshold=0.9)).footprint
     assert strict.p_tp == pytest.approx(0.5 * footprint.p_tp)
     assert 1.0 - strict.p_tn == pytest.approx(0.1 * (1.0 - footprint.p_tn))
+
+
+def test_the_middle_of_the_image_lies_where_the_nose_points_on_the_globe() -> None:
+    here = Pose(*(float(x) for x in FRAME.to_latlon([[15, 15]])[0]), 60.0, 70.0, 0.0)
+    ahead = report({"box": [958, 538, 962, 542]}, gimbal={"pitch_deg": -45.0})
+    (seen,) = SENSOR.read(here, ahead).sightings
+    azimuth, _, metres = pyproj.Geod(ellps="WGS84").inv(here.lon, here.lat, seen.lon, seen.lat)
+    assert azimuth == pytest.approx(70.0, abs=0.1)
+    assert metres == pytest.approx(60.0, abs=0.1)
+    east = Gimbal(pitch_deg=-45.0, yaw_deg=90.0, relative_to="earth")
+    ahead = report({"box": [958, 538, 962, 542]}, gimbal=east.model_dump())
+    (seen,) = SENSOR.read(here, ahead).sightings
+    azimuth, _, _ = pyproj.Geod(ellps="WGS84").inv(here.lon, here.lat, seen.lon, seen.lat)
+    assert azimuth == pytest.approx(90.0, abs=0.1)

@@ -1,0 +1,64 @@
+"""The command that measures the default planner: its figures, its table, and that it goes on where it stopped."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from roisearch import FieldOfView
+from roisearch.planners.sweep import SweepPlanner, SweepSettings
+from sim import ablation
+from sim.ruler import detection_curve
+
+
+def hills() -> np.ndarray:
+    row, col = np.indices((40, 44))
+    two = [np.exp(-((row - r) ** 2 + (col - c) ** 2) / 18.0) for r, c in ((10, 30), (30, 12))]
+    return np.asarray(sum(two) / np.sum(two))
+
+
+def test_ratio_of_sums_and_mean_of_ratios_with_their_errors() -> None:
+    found = ablation.above(np.array([[110.0, 100.0], [360.0, 300.0]]))
+    assert found["ratio_of_sums"] == pytest.approx(470 / 400 - 1)
+    assert found["mean_of_ratios"] == pytest.approx(0.15)
+    assert found["mean_of_ratios_error"] == pytest.approx(np.std([1.1, 1.2], ddof=1) / np.sqrt(2))
+    left = 110 - 1.175 * 100
+    assert found["ratio_of_sums_error"] == pytest.approx(np.sqrt(2 * 2 * left**2) / 400)
+
+
+def test_following_an_unthought_path_gives_the_curve_of_planning_at_every_step() -> None:
+    fov, curves = FieldOfView.point(0.9, 1.0), []
+    for follow in (False, True):
+        planner = SweepPlanner(SweepSettings(iterations=0, horizon=800), fov=fov)
+        rng = np.random.default_rng(0)
+        curves.append(detection_curve(planner, hills(), (2, 2), 0.9, 1500, rng, follow=follow))
+    np.testing.assert_allclose(curves[0], curves[1], atol=1e-12)
+    assert curves[0][-1] > 0.9
+
+
+def test_it_goes_on_where_it_stopped_and_writes_table_summary_and_figure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(ablation, "PAPER_STEPS", 150)
+    arguments = ["--variants", "iterations=0,horizon=200 index", "--out", str(tmp_path), "--first", "7"]
+    assert ablation.main([*arguments, "--priors", "1"]) == 0
+    first = (tmp_path / "results.csv").read_text()
+    assert ablation.main([*arguments, "--priors", "2"]) == 0
+    assert (tmp_path / "results.csv").read_text().startswith(first)
+    with (tmp_path / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["variant"], row["seed"]) for row in rows] == [
+        (variant, seed) for seed in ("7", "8") for variant in ("iterations=0,horizon=200", "index")
+    ]
+    assert all(float(row["expected"]) >= float(row["reference"]) > 0.0 for row in rows)
+    assert "| `index` | 2 |" in (tmp_path / "ablation.md").read_text()
+    assert (tmp_path / "summary.json").exists()
+    assert (tmp_path / "above-bound.png").stat().st_size > 5000
+
+
+def test_an_unknown_setting_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert ablation.main(["--variants", "depth=4", "--out", str(tmp_path)]) == 2
+    assert "'depth' is neither a planner nor one of the settings" in capsys.readouterr().err

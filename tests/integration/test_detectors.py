@@ -84,7 +84,9 @@ def whole(request: bytes) -> bool:
 
 def test_the_readmes_client_and_every_door_report_to_a_real_service(tmp_path: Path) -> None:
     settings, unix = tmp_path / "s.toml", tmp_path / "reports.sock"
-    settings.write_text(f'[doors]\nudp = "127.0.0.1:0"\nunix = "{unix}"\n')
+    settings.write_text(
+        f'[flight]\naltitude_m = 10\n[sensor]\ncell_m = 20\n[doors]\nudp = "127.0.0.1:0"\nunix = "{unix}"\n'
+    )
     words = service_words(
         write_area(tmp_path), tmp_path / "runs", "--speedup", "1", "--config", str(settings)
     )

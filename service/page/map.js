@@ -49,7 +49,7 @@ export class Chart {
     this.run = run;
     this.onSuspect = onSuspect;
     const { frame, tiles } = run.scene;
-    this.map = L.map(element, { zoomSnap: 0.1, zoomDelta: 0.5, maxZoom: 21, attributionControl: !!tiles, preferCanvas: false });
+    this.map = L.map(element, { zoomSnap: 0.1, zoomDelta: 0.5, maxZoom: 21, attributionControl: !!tiles?.attribution, preferCanvas: false });
     this.map.attributionControl?.setPrefix(false);
     L.control.scale({ imperial: false, maxWidth: 160 }).addTo(this.map);
     for (const [name, height] of [["cells", 350], ["pod", 351], ["ground", 360], ["flight", 420]]) this.map.createPane(name).style.zIndex = height;

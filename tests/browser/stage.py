@@ -32,7 +32,6 @@ p_tn = 0.97
 silent_after_s = 300
 [page]
 mbtiles_file = "{tiles}"
-tiles_attribution = "tiles of the test"
 """
 AXE = Path(__file__).parent / "vendor" / "axe-core" / "axe.min.js"
 AXE_RUN = """async () => {
@@ -151,13 +150,14 @@ class Watch:
         return count
 
     def cell(self, row: int, col: int) -> int:
-        """How opaque a cell of the heat layer is, 0 to 255."""
+        """How dark a cell of the heat layer is on a white ground, 0 to 765."""
         script = """([row, col]) => {
           const canvas = [...document.querySelectorAll("canvas.cells")].find((each) => each.ariaLabel.includes("Heat"));
-          return canvas.getContext("2d").getImageData(col, row, 1, 1).data[3];
+          const [r, g, b, alpha] = canvas.getContext("2d").getImageData(col, row, 1, 1).data;
+          return Math.round(((765 - r - g - b) * alpha) / 255);
         }"""
-        alpha: int = self.page.evaluate(script, [row, col])
-        return alpha
+        dark: int = self.page.evaluate(script, [row, col])
+        return dark
 
     def close(self) -> None:
         """Close the page; it must have had nothing to complain about."""

@@ -24,9 +24,7 @@ def test_a_door_that_does_not_open_is_told_before_the_flight(tmp_path: Path) -> 
     settings = Settings.model_validate({"sensor": {"cell_m": 20.0}})
     area = parse_area(json.dumps(FIELD).encode(), source="field")
     search = Search(build_grid(area, 20.0), settings)
-    service = Service(
-        area, search, make_sensor(settings, search.grid, search.fov), settings, tmp_path, Console()
-    )
+    service = Service(area, search, make_sensor(settings, search.grid), settings, tmp_path, Console())
 
     async def shut() -> None:
         raise OSError("the door is jammed")

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from service.config import Settings
-from service.flight import LatLon
-from service.mission import Mission
-from service.states import State
+from service.mission.flight import LatLon
+from service.mission.mission import Mission
+from service.mission.states import State
 
 log = logging.getLogger("roisearch")
 

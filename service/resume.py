@@ -9,12 +9,12 @@ from typing import Any
 from service.area import Grid, SearchArea
 from service.config import Settings, changed_settings
 from service.errors import BadInput
-from service.evidence import Observation
-from service.intake import Intake
+from service.evidence.intake import Intake
+from service.evidence.observe import Observation
+from service.evidence.verdict import ROW as VERDICT
 from service.journal import Row, read_meta, read_rows
 from service.search import Search
 from service.survey import AREA, JOURNAL, PRIOR, survey
-from service.verdict import ROW as VERDICT
 
 
 def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:

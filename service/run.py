@@ -24,21 +24,21 @@ from service.config import Settings
 from service.demo import World
 from service.doors import Doors, open_doors
 from service.errors import BadInput
-from service.evidence import Observation, Pose
+from service.evidence.intake import Intake, JournalLost
+from service.evidence.observe import Observation, Pose
+from service.evidence.passes import Passes
+from service.evidence.sensors import Profile, make_sensor
 from service.http import Door, open_door
-from service.intake import Intake, JournalLost
 from service.journal import Journal
 from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
-from service.mission import Mission
-from service.passes import Passes
+from service.mission.mission import Mission
+from service.mission.states import FINAL
 from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
 from service.resume import replay, stored_settings
 from service.search import Search
-from service.sensors import Profile, make_sensor
-from service.states import FINAL
 from service.survey import AREA, JOURNAL, PRIOR, survey
-from service.view import RunView
+from service.view.live import RunView
 
 log = logging.getLogger("roisearch")
 EXIT_CODES = {"found": 0, "not_found": 3, "aborted": 4}

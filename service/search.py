@@ -19,10 +19,10 @@ from roisearch.detection import DetectionRecord
 from roisearch.place import Place, most_likely_place, place_at
 from service.area import Grid
 from service.config import Settings
-from service.evidence import Observation
-from service.reasons import Reason, explain
-from service.sensors import field_of_view
-from service.suspects import Found, Sightings
+from service.evidence.observe import Observation
+from service.evidence.sensors import field_of_view
+from service.evidence.suspects import Found, Sightings
+from service.view.reasons import Reason, explain
 
 Cell = tuple[int, int]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from service.area import Grid, SearchArea, build_grid, read_area, read_geotiff_prior
 from service.config import Settings
-from service.sensors import cell_size
+from service.evidence.sensors import cell_size
 
 AREA, PRIOR, JOURNAL = "area.geojson", "prior.tif", "journal.sqlite"
 """The files in a run's folder that the search is made of."""

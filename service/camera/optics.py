@@ -1,8 +1,8 @@
 """A pinhole camera and where it looks.
 
-Angles are those of `service.reports`, in MAVLink's order: yaw clockwise from above, then pitch up, then roll to the
-right; a pitch of -90 looks straight down with the top of the image to the nose. Pixels count from the top left
-corner of the image, x to the right and y down.
+Angles are those of `service.evidence.reports`, in MAVLink's order: yaw clockwise from above, then pitch up, then roll
+to the right; a pitch of -90 looks straight down with the top of the image to the nose. Pixels count from the top
+left corner of the image, x to the right and y down.
 """
 
 from __future__ import annotations

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
-from service.calibration import Calibration
 from service.camera.detect import Detectability
 from service.camera.ground import Flat, Ground
 from service.camera.locate import Errors, Spot, locate_pixel, spread_hits
 from service.camera.look import Looks, look_at_cells
 from service.camera.optics import Pinhole, Sight, rotation, sight_from
-from service.evidence import Footprint, Pose, Reading, Sighting, Unreadable
-from service.reports import Detection, Gimbal, Intrinsics, Report
+from service.evidence.calibration import Calibration
+from service.evidence.observe import Footprint, Pose, Reading, Sighting, Unreadable
+from service.evidence.reports import Detection, Gimbal, Intrinsics, Report
 
 
 @dataclass(frozen=True)

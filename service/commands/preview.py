@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from service.errors import BadInput
 
 if TYPE_CHECKING:
-    from service.preview import Preview
+    from service.preview.preview import Preview
 
 EXAMPLES = """\
 examples:
@@ -53,12 +53,12 @@ def main(arguments: list[str]) -> int:
     settings = read_settings(options.config, flags=flags)
     with _progress() as told:
         told("reading the area", 0.0)
-        from service.preview import preview
+        from service.preview.preview import preview
         from service.survey import survey
 
         area, grid = survey(options.area, options.prior, settings)
         seen = preview(area, grid, settings, options.battery, told)
-    from service.preview_text import text
+    from service.preview.text import text
 
     print(text(seen))
     if options.out is not None:
@@ -67,7 +67,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _write(path: Path, seen: Preview) -> None:
-    from service.preview_page import draw, page
+    from service.preview.page import draw, page
 
     try:
         path.write_bytes(draw(seen) if path.suffix == ".png" else page(seen))

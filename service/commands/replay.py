@@ -32,7 +32,7 @@ def main(arguments: Sequence[str]) -> int:
     options = parser().parse_args(list(arguments))
     from service.config import read_settings
     from service.http import open_door
-    from service.replay import ReplayView
+    from service.view.replay import ReplayView
 
     settings = read_settings(options.config, flags={"http.listen": options.http})
     view = ReplayView(options.run)

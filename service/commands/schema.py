@@ -8,7 +8,7 @@ import argparse
 def main(arguments: list[str]) -> int:
     """Print it."""
     argparse.ArgumentParser(prog="roisearch-service schema", description=__doc__).parse_args(arguments)
-    from service.reports import schema_text
+    from service.evidence.reports import schema_text
 
     print(schema_text(), end="")
     return 0

@@ -8,8 +8,8 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from pydantic import ValidationError
 
-from service.intake import JournalLost
-from service.reports import Receipt, Report
+from service.evidence.intake import JournalLost
+from service.evidence.reports import Receipt, Report
 
 log = logging.getLogger("roisearch")
 SubmitAll = Callable[[Sequence[Report]], Awaitable[list[Receipt]]]

@@ -92,7 +92,15 @@ async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
             if reason != told:
                 log.warning("the MQTT broker %s cannot be reached (%s): trying again", broker.url, reason)
             told = reason
+            _end_if_cancelled()
         await asyncio.sleep(RETRY_S)
+
+
+def _end_if_cancelled() -> None:
+    """A task group that a broken connection and a cancellation reach together raises the former only."""
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
 
 
 async def _listen(client: Client, broker: Broker, submit: SubmitAll) -> None:

@@ -15,7 +15,7 @@ from service.area.prior import cell_squares
 from service.export.gaps import find_gaps
 from service.export.run import Find, Fix, Run
 from service.export.wishes import Wishes
-from service.shapes import on_earth
+from service.view.shapes import on_earth
 
 _CORNERS = 48
 

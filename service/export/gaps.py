@@ -17,8 +17,8 @@ from service.area.frame import BoolArray
 from service.area.prior import cell_squares
 from service.export.run import Run
 from service.export.wishes import Wishes
-from service.flight import LatLon
-from service.shapes import on_earth
+from service.mission.flight import LatLon
+from service.view.shapes import on_earth
 
 _LEAST_M2 = 1.0
 

@@ -10,7 +10,7 @@ import shapely
 from service.export.features import Item, iso, items
 from service.export.run import Run
 from service.export.wishes import Wishes
-from service.shapes import DIGITS, collection, feature, plain, point
+from service.view.shapes import DIGITS, collection, feature, plain, point
 
 
 def write(run: Run, wishes: Wishes) -> bytes:

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from service.export.gaps import Gap, gap_cells
 from service.export.run import Run
 from service.export.wishes import Wishes
-from service.picture import Scene, draw_scene
+from service.view.picture import Scene, draw_scene
 
 WELL = 0.8
 """From this POD on, ground is drawn as well searched."""

@@ -22,12 +22,12 @@ from service.area import way_home
 from service.errors import BadInput
 from service.export.run import Run
 from service.export.wishes import Wishes
-from service.flight import LatLon
-from service.foresight import foresee
-from service.navigator import Cell, straight_part
-from service.pace import climb_seconds, leg_seconds
+from service.mission.flight import LatLon
+from service.mission.navigator import Cell, straight_part
+from service.preview.foresight import foresee
+from service.preview.pace import climb_seconds, leg_seconds
 from service.search import Search
-from service.shapes import on_earth
+from service.view.shapes import on_earth
 
 log = logging.getLogger("roisearch")
 MOST_WAYPOINTS = 480

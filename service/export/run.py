@@ -20,17 +20,17 @@ from roisearch import Belief
 from service.area import Grid, SearchArea
 from service.area.frame import GridFrame
 from service.config import Settings
-from service.curve import PosCurve
 from service.errors import BadInput
-from service.evidence import Observation
-from service.flight import LatLon
+from service.evidence.observe import Observation
+from service.evidence.suspects import IN_95_PERCENT
+from service.evidence.verdict import ROW as VERDICT
 from service.journal import Row
+from service.mission.flight import LatLon
+from service.mission.states import FINAL, Event, State
 from service.resume import retrace, stored_run
 from service.search import Search
-from service.states import FINAL, Event, State
 from service.survey import JOURNAL
-from service.suspects import IN_95_PERCENT
-from service.verdict import ROW as VERDICT
+from service.view.curve import PosCurve
 
 BREAK_S = 60.0
 """A track is broken where nothing was heard of the aircraft for so long."""

@@ -16,6 +16,8 @@ from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from starlette.middleware.cors import CORSMiddleware
 
 from service.config import HttpSettings
+from service.evidence.intake import JournalLost
+from service.evidence.reports import EXAMPLES, Command, Receipt, Report
 from service.http import examples
 from service.http.access import Access
 from service.http.docs import describe_api
@@ -24,9 +26,7 @@ from service.http.guard import Guard, Refusal, client_of, too_many
 from service.http.page import FOLDER, Parts, policy
 from service.http.rate import Buckets
 from service.http.run import PastRun, Run
-from service.intake import JournalLost
-from service.reports import EXAMPLES, Command, Receipt, Report
-from service.underlay import NO_UNDERLAY, Underlay
+from service.view.underlay import NO_UNDERLAY, Underlay
 
 At = Annotated[
     float | None,

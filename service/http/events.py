@@ -14,9 +14,9 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from service.feed import Feed
 from service.http.guard import SUBPROTOCOL
 from service.http.run import Run
+from service.view.feed import Feed
 
 EVERY_S = 0.25
 MOST_WATCHERS = 32

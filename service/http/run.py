@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from prometheus_client import CollectorRegistry
 
-from service.feed import Moment
-from service.reports import Receipt, Report
+from service.evidence.reports import Receipt, Report
+from service.view.feed import Moment
 
 
 class Run(Protocol):

@@ -18,7 +18,7 @@ from service.http.access import Access, read_access
 from service.http.address import bind, bound_address, split_address, url_of
 from service.http.app import create_app
 from service.http.run import PastRun, Run
-from service.underlay import NO_UNDERLAY, Underlay, open_underlay
+from service.view.underlay import NO_UNDERLAY, Underlay, open_underlay
 
 _MOST_CONNECTIONS = 256
 _MOST_HEADER_BYTES = 16_384

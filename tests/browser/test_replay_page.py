@@ -15,9 +15,9 @@ from playwright.sync_api import Browser, expect
 
 from service.area import build_grid, read_area
 from service.config import Settings
-from service.evidence import Observation
+from service.evidence.observe import Observation
+from service.evidence.verdict import verdict_on, verdict_row
 from service.journal import Journal
-from service.verdict import verdict_on, verdict_row
 from tests.integration.flight import running, write_area
 
 from .stage import Watch

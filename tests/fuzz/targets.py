@@ -25,15 +25,15 @@ from service.area import build_grid, parse_area
 from service.clock import Clock
 from service.config import Settings, read_settings
 from service.errors import BadInput
-from service.evidence import Observation, Pose, Sensor
+from service.evidence.intake import Intake
+from service.evidence.observe import Observation, Pose, Sensor
+from service.evidence.reports import Receipt, Report
 from service.http import create_app, split_address
-from service.intake import Intake
 from service.journal import Journal
 from service.mavlink import NotPermitted
 from service.mavlink.core import LinkCore
 from service.mavlink.settings import LinkSettings
 from service.mavlink.url import parse_url
-from service.reports import Receipt, Report
 from service.search import Search
 from tests.integration.flight import FIELD
 from tests.service.mavlink_peer import START, Peer

@@ -7,7 +7,7 @@ import time
 from types import FrameType
 
 from service.cli import main
-from service.mission import Mission
+from service.mission.mission import Mission
 
 STALL_S = 5.0
 

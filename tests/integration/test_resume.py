@@ -10,7 +10,7 @@ import pytest
 
 from roisearch import Belief
 from service.area import build_grid, read_area
-from service.evidence import Observation
+from service.evidence.observe import Observation
 from service.journal import read_rows
 from tests.integration.flight import only_report, running, service_words, write_area
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from prometheus_client import CollectorRegistry
 
 from service.config import HttpSettings
-from service.feed import Moment
+from service.evidence.reports import Receipt, Report
 from service.http import Access, Door, Server, create_app, open_door, read_access
-from service.reports import Receipt, Report
+from service.view.feed import Moment
 
 COMMAND, REPORT = "command-token-0123456789", "report-token-0123456789"
 HOLD = {"command": "hold"}

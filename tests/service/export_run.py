@@ -11,7 +11,7 @@ import numpy as np
 
 from service.area import Grid
 from service.config import Settings
-from service.evidence import Observation, Sighting
+from service.evidence.observe import Observation, Sighting
 from service.journal import Journal
 from service.survey import AREA, JOURNAL, survey
 from tests.service.area_files import at, box, collection, feature, point, polygon, ring

@@ -12,10 +12,10 @@ from roisearch import Belief, FieldOfView
 from roisearch.detection import DetectionRecord
 from service.area import GridFrame
 from service.clock import Clock
-from service.evidence import Cell, Observation, Pose, Sensor
-from service.intake import Intake
+from service.evidence.intake import Intake
+from service.evidence.observe import Cell, Observation, Pose, Sensor
+from service.evidence.reports import Detection, Report
 from service.journal import Journal
-from service.reports import Detection, Report
 
 FRAME = GridFrame(47.05, 8.30, 0.0, 25.0, 20, 30, -375.0, 250.0)
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from roisearch import Belief, FieldOfView
 from service.area import GridFrame
-from service.calibration import Calibration, read_calibration
 from service.errors import BadInput
-from service.evidence import Pose, Sensor, observe
-from service.passes import Passes
-from service.reports import Report
+from service.evidence.calibration import Calibration, read_calibration
+from service.evidence.observe import Pose, Sensor, observe
+from service.evidence.passes import Passes
+from service.evidence.reports import Report
 
 FRAME = GridFrame(47.05, 8.30, 0.0, 25.0, 20, 30, -375.0, 250.0)
 RATIOS = "score,likelihood_ratio\n0.2,0.5\n0.6,8\n0.9,200\n"
@@ -71,7 +71,7 @@ def test_a_higher_score_is_never_worth_less(tmp_path: Path) -> None:
 )
 def test_what_the_hits_are_worth_averages_out_over_false_alarms(counts: list[tuple[int, int]]) -> None:
     """The mean likelihood ratio of false alarms is P(hit | there) / P(hit | not there), whatever was taken together."""
-    from service.calibration import _of_roc
+    from service.evidence.calibration import _of_roc
 
     hits, alarms = np.array(counts, dtype=float).T
     above_hits, above_alarms = hits[::-1].cumsum()[::-1], alarms[::-1].cumsum()[::-1]

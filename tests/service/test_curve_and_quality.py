@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from service.curve import PosCurve
 from service.mavlink.quality import LinkQuality
-from service.replay import monotone
+from service.view.curve import PosCurve
+from service.view.replay import monotone
 
 
 def test_the_curve_counts_only_the_time_in_which_reports_came() -> None:

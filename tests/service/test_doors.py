@@ -25,8 +25,8 @@ from service.config import DoorSettings
 from service.doors import Doors, open_doors
 from service.doors.lines import answer
 from service.errors import BadInput
-from service.intake import JournalLost
-from service.reports import EXAMPLES, Receipt, Report
+from service.evidence.intake import JournalLost
+from service.evidence.reports import EXAMPLES, Receipt, Report
 
 PATIENCE_S = 30.0
 

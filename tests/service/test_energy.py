@@ -7,8 +7,8 @@ import math
 import pytest
 
 from service.config import FlightSettings
-from service.energy import Consumption, Energy, WayHome, WindFelt, speed_over_ground
 from service.mavlink.telemetry import Wind
+from service.mission.energy import Consumption, Energy, WayHome, WindFelt, speed_over_ground
 
 FLIGHT = FlightSettings(return_height_m=30.0, descent_mps=1.0, climb_mps=2.0)
 STRAIGHT = [(0.0, 0.0), (-800.0, 0.0)]  # 800 m to the west

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from roisearch import Belief, FieldOfView
 from service.area import GridFrame
-from service.evidence import Footprint, Observation, Pose, Reading, Sensor, grid_heading, observe
-from service.passes import Passes
+from service.evidence.observe import Footprint, Observation, Pose, Reading, Sensor, grid_heading, observe
+from service.evidence.passes import Passes
 
 CLOCK = itertools.count(100.0, 1.0 / 30.0)
 FRAME = GridFrame(47.05, 8.30, 0.0, 25.0, 20, 30, -375.0, 250.0)

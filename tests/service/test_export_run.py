@@ -13,13 +13,13 @@ import pytest
 
 from roisearch import Belief
 from service.errors import BadInput
-from service.evidence import Observation, Sighting
+from service.evidence.observe import Observation, Sighting
+from service.evidence.verdict import verdict_on, verdict_row
 from service.export.gaps import find_gaps, gap_cells
 from service.export.run import read_run
 from service.export.wishes import Wishes
 from service.journal import read_rows
 from service.survey import AREA, JOURNAL
-from service.verdict import verdict_on, verdict_row
 from tests.service.export_run import BEGAN, SETTINGS, Recorder, record
 
 

@@ -18,12 +18,12 @@ from roisearch import SearchState
 from service.area import Grid, build_grid, read_area
 from service.config import Settings
 from service.demo import draw
-from service.evidence import Pose, observe
-from service.navigator import heading_between
-from service.passes import Passes
-from service.reports import Report
+from service.evidence.observe import Pose, observe
+from service.evidence.passes import Passes
+from service.evidence.reports import Report
+from service.evidence.sensors import cell_size, make_sensor
+from service.mission.navigator import heading_between
 from service.search import Search
-from service.sensors import cell_size, make_sensor
 from sim.detector import Detector
 
 AREAS = sorted((Path(__file__).parents[2] / "config" / "areas").glob("*.geojson"))

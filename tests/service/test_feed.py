@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roisearch import Belief
-from service.feed import Feed, Moment
+from service.view.feed import Feed, Moment
 
 
 class Watcher:

@@ -14,11 +14,11 @@ import shapely
 from service.area import build_grid, parse_area
 from service.clock import Clock
 from service.config import FlightSettings, Settings
-from service.fence import Fence, Straying, height_objection
-from service.helm import Helm
 from service.mavlink import Vehicle
 from service.mavlink.settings import LinkSettings
 from service.mavlink.telemetry import Home, Telemetry
+from service.mission.fence import Fence, Straying, height_objection
+from service.mission.helm import Helm
 from sim.soak import ground
 
 # An L, 400 m high and wide, 100 m thick; the launch point in the crook, 50 m from both arms; a block near the launch.

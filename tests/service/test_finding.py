@@ -14,13 +14,13 @@ import pytest
 from service.area import build_grid, read_area
 from service.clock import Clock
 from service.config import Settings
-from service.evidence import Observation
-from service.finding import Finding
-from service.intake import Intake
+from service.evidence.intake import Intake
+from service.evidence.observe import Observation
+from service.evidence.sensors import make_sensor
 from service.journal import Journal
+from service.mission.finding import Finding
+from service.mission.states import Event, State, next_state
 from service.search import Search
-from service.sensors import make_sensor
-from service.states import Event, State, next_state
 from tests.integration.flight import write_area
 
 

@@ -6,8 +6,8 @@ import asyncio
 from types import SimpleNamespace
 from typing import Any, cast
 
-from service.mission import Mission
-from service.states import Event, State
+from service.mission.mission import Mission
+from service.mission.states import Event, State
 
 
 class Homebound:

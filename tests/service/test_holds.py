@@ -9,9 +9,9 @@ from typing import Any, cast
 import pytest
 
 from service.config import Settings
-from service.holds import Holds
-from service.mission import Mission
-from service.states import Event, State, next_state
+from service.mission.holds import Holds
+from service.mission.mission import Mission
+from service.mission.states import Event, State, next_state
 
 
 class Stage:

@@ -16,10 +16,10 @@ from roisearch import Belief, FieldOfView
 from roisearch.detection import DetectionRecord
 from service.area import GridFrame
 from service.clock import Clock
-from service.evidence import Observation, Pose, Sensor
-from service.intake import Intake, JournalLost
+from service.evidence.intake import Intake, JournalLost
+from service.evidence.observe import Observation, Pose, Sensor
+from service.evidence.reports import Detection, Report
 from service.journal import Journal, read_rows
-from service.reports import Detection, Report
 
 FRAME = GridFrame(47.05, 8.30, 0.0, 25.0, 20, 30, -375.0, 250.0)
 
@@ -220,7 +220,7 @@ def test_a_large_batch_is_written_whole_and_a_report_beside_it_does_not_wait_for
 def test_a_flood_is_refused_in_words_and_not_kept(
     flying: Callable[..., Intake], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.intake.MOST_WAITING", 10)
+    monkeypatch.setattr("service.evidence.intake.MOST_WAITING", 10)
     intake = flying()
 
     async def flood() -> list[str]:

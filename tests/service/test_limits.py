@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 
 from service.config import FlightSettings
-from service.limits import (
+from service.mavlink.telemetry import Telemetry, Wind
+from service.mission.limits import (
     Lasting,
     PositionTrust,
     Progress,
     position_objections,
     wind_objection,
 )
-from service.mavlink.telemetry import Telemetry, Wind
 
 FLIGHT = FlightSettings()
 FRESH_S = 2.0

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.navigator import HEADING, Navigator, heading_between, straight_part
+from service.mission.navigator import HEADING, Navigator, heading_between, straight_part
 
 
 def navigator(speed_mps: float = 8.0) -> Navigator:

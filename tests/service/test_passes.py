@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.passes import SILENT_S, Change, Look, Passes, as_likelihoods
+from service.evidence.passes import SILENT_S, Change, Look, Passes, as_likelihoods
 
 HERE, THERE = (3, 4), (3, 5)
 P_TN = 0.8

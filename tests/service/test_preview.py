@@ -15,10 +15,10 @@ from service.area import Grid, SearchArea
 from service.commands.preview import main
 from service.config import FlightSettings, Settings
 from service.errors import BadInput
-from service.foresight import Foresight, foresee
-from service.pace import cell_seconds, leg_seconds
-from service.preview import preview
-from service.preview_text import facts
+from service.preview.foresight import Foresight, foresee
+from service.preview.pace import cell_seconds, leg_seconds
+from service.preview.preview import preview
+from service.preview.text import facts
 from service.search import Search
 from service.survey import AREA, survey
 from tests.service.export_run import SETTINGS, field_grid

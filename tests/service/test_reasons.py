@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from roisearch import Decision, Effort, segment_regions
-from service.reasons import explain
+from service.view.reasons import explain
 
 EFFORT = Effort(10, 0.001)
 

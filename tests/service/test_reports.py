@@ -11,7 +11,7 @@ import pytest
 from pydantic import ValidationError
 
 from service.cli import main
-from service.reports import EXAMPLES, Report
+from service.evidence.reports import EXAMPLES, Report
 
 from .door import FakeRun, ask
 

@@ -13,10 +13,10 @@ from rich.console import Console
 
 from service.area import build_grid, parse_area
 from service.config import Settings
+from service.evidence.sensors import make_sensor
 from service.journal import Journal
 from service.run import Service
 from service.search import Search
-from service.sensors import make_sensor
 from tests.integration.flight import FIELD
 
 

@@ -12,8 +12,8 @@ from service.area import build_grid, read_area
 from service.camera.sensor import CameraSensor
 from service.config import Settings, read_settings
 from service.errors import BadInput
-from service.evidence import Sensor
-from service.sensors import cell_size, field_of_view, make_sensor
+from service.evidence.observe import Sensor
+from service.evidence.sensors import cell_size, field_of_view, make_sensor
 from tests.integration.flight import write_area
 
 CAMERA = Path(__file__).parents[2] / "config" / "camera.toml"

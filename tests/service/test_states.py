@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from service.states import FINAL, MAY_MOVE, TABLE, Event, State, diagram, next_state
+from service.mission.states import FINAL, MAY_MOVE, TABLE, Event, State, diagram, next_state
 
 
 def test_an_event_that_is_not_in_the_table_changes_nothing() -> None:

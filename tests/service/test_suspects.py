@@ -15,14 +15,14 @@ from roisearch.place import likely_places, most_likely_place, place_at
 from service.area import GridFrame, build_grid, read_area
 from service.clock import Clock
 from service.config import Settings
-from service.evidence import Observation, Pose, Sighting
-from service.intake import Intake
+from service.evidence.intake import Intake
+from service.evidence.observe import Observation, Pose, Sighting
+from service.evidence.reports import Report
+from service.evidence.sensors import make_sensor
+from service.evidence.suspects import IN_95_PERCENT, Found, Sightings
 from service.journal import Journal
-from service.reports import Report
 from service.resume import replay
 from service.search import Search
-from service.sensors import make_sensor
-from service.suspects import IN_95_PERCENT, Found, Sightings
 from tests.integration.flight import write_area
 
 FRAME = GridFrame(47.05, 8.30, 30.0, 25.0, 20, 30, -375.0, 250.0)

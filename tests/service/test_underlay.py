@@ -9,7 +9,7 @@ import pytest
 
 from service.config import PageSettings
 from service.errors import BadInput
-from service.underlay import NO_UNDERLAY, open_underlay
+from service.view.underlay import NO_UNDERLAY, open_underlay
 
 
 def mbtiles(path: Path, kind: str = "png", tiles: int = 1) -> Path:

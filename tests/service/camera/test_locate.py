@@ -10,15 +10,15 @@ import pytest
 
 from roisearch import Belief, FieldOfView
 from service.area import GridFrame
-from service.calibration import Calibration
 from service.camera import Errors, Flat, Pinhole, Sight, Spot, locate_pixel, rotation, sight_from, spread
 from service.camera.locate import shares
 from service.camera.sensor import CameraSensor, Mount
 from service.config import Settings
-from service.evidence import Pose, Sensor, Unreadable, observe
-from service.passes import Passes
-from service.reports import Gimbal, Report
-from service.sensors import camera_sensor, cell_size, field_of_view
+from service.evidence.calibration import Calibration
+from service.evidence.observe import Pose, Sensor, Unreadable, observe
+from service.evidence.passes import Passes
+from service.evidence.reports import Gimbal, Report
+from service.evidence.sensors import camera_sensor, cell_size, field_of_view
 
 CAMERA = Pinhole.of_angles(1920, 1080, 70.0)
 ERRORS = Errors(attitude_deg=1.5, position_m=2.0, height_m=2.0)

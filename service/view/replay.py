@@ -14,18 +14,18 @@ from prometheus_client import CollectorRegistry
 
 from roisearch import Belief
 from roisearch.detection import DetectionRecord
-from service.base_view import BaseView
-from service.curve import PosCurve
-from service.evidence import Observation, Pose
-from service.feed import Moment
-from service.flight import LatLon
+from service.evidence.observe import Observation, Pose
+from service.evidence.reports import Receipt, Report
+from service.evidence.sensors import make_sensor
+from service.evidence.suspects import Sightings
 from service.journal import Row
-from service.reports import Receipt, Report
+from service.mission.flight import LatLon
+from service.mission.states import FINAL, FLYING, State
 from service.resume import retrace, stored_run
 from service.search import Search
-from service.sensors import make_sensor
-from service.states import FINAL, FLYING, State
-from service.suspects import Sightings
+from service.view.base import BaseView
+from service.view.curve import PosCurve
+from service.view.feed import Moment
 
 KEPT = 32  # copies of the belief along the run, to go back to
 TRACK_EVERY_S = 1.0

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from service.evidence import Cell, Observation
+from service.evidence.observe import Cell, Observation
 
 ROW = "verdict"
 

@@ -1,9 +1,9 @@
 """The mission: one search, from the first heartbeat to the ground.
 
-`Mission.run` goes through the phases; a watcher beside it listens to the vehicle. Both change the state only
-through `happen`, which looks the table of `service.states` up, journals the transition and tells the pilot. A guard
-looks ten times a second at what `service.limits` objects to. Every waypoint passes the helm, which asks for a state
-that may move, a position to trust and a leg that is clear, and writes it to the journal before it goes out.
+`Mission.run` goes through the phases; a `Watch` beside it listens to the vehicle. Both change the state only through
+`happen`, which looks the table of `states` up, journals the transition and tells the pilot. A guard looks ten times a
+second at what `limits` objects to. Every waypoint passes the helm, which asks for a state that may move, a position to
+trust and a leg that is clear, and writes it to the journal before it goes out.
 """
 
 from __future__ import annotations
@@ -18,31 +18,28 @@ from collections.abc import Awaitable, Callable, Mapping
 from roisearch import Decision
 from service.clock import Clock
 from service.config import Settings
-from service.evidence import Observation
-from service.finding import Finding
-from service.flight import Flight, LatLon
-from service.helm import Helm
-from service.holds import Holds
-from service.homeward import Homeward
-from service.intake import Intake, JournalLost
+from service.evidence.intake import Intake, JournalLost
+from service.evidence.observe import Observation
+from service.evidence.suspects import Found
 from service.journal import Journal
 from service.mavlink import LinkError, Vehicle
-from service.mavlink.events import LinkLost, ModeChanged, Stalled, TargetNotTaken, TargetTaken
-from service.navigator import Cell, Navigator
-from service.reasons import Reason
+from service.mission.finding import Finding
+from service.mission.flight import Flight, LatLon
+from service.mission.helm import Helm
+from service.mission.holds import Holds
+from service.mission.homeward import Homeward
+from service.mission.navigator import Cell, Navigator
+from service.mission.states import FINAL, FLYING, MAY_MOVE, MOVING, Event, State, next_state
+from service.mission.watch import Watch
 from service.search import Search
-from service.states import FINAL, FLYING, MAY_MOVE, Event, State, next_state
-from service.suspects import Found
-from service.takeover import Takeovers
+from service.view.reasons import Reason
 
 log = logging.getLogger("roisearch")
 TICK_S = 0.1
 RETRY_S = 1.0
-REFUSALS = 2  # so many waypoints in a row that are not flown are no bad luck
 LEAVING_S = 5.0
 _CRITICAL = 2  # MAV_SEVERITY
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
-MOVING = (*FLYING, State.RETURNING)
 
 
 class Mission:
@@ -75,10 +72,8 @@ class Mission:
         self.why_here = ""  # the reason of the last transition
         self.why_stopped = ""
         self.searched = False  # the search ended because there was nothing more to gain, not by an order
-        self._resend = False  # the last waypoint may have been lost
+        self.resend = False  # the last waypoint may have been lost: `Watch` says so
         self._hovering = False  # over a suspect, for another look
-        self._refused = 0  # waypoints in a row that were not flown
-        self._takeovers = Takeovers()
         fly = settings.flight
         self._navigator = Navigator(self.frame.cell_m, fly.speed_mps, fly.deceleration_mps2, fly.corner_m)
         self._thinking: asyncio.Task[Decision] | None = None
@@ -91,6 +86,7 @@ class Mission:
         self.finding = Finding(self, write=self._write, tick=self._tick, energy_low=self._energy_low)
         self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
         self.homeward = Homeward(self.helm, clock, fly)
+        self.watch = Watch(self, write=self._write)
 
     # ---- state -------------------------------------------------------------------------------------------
 
@@ -196,7 +192,7 @@ class Mission:
     async def run(self) -> None:
         """Fly the whole mission; returns when the state is final."""
         async with self._group as group:
-            jobs = (self._watch(), self._guard(), self._keep_track())
+            jobs = (self.watch.run(), self._guard(), self._keep_track())
             watchers = [group.create_task(job) for job in jobs]
             try:
                 await self._get_ready()
@@ -333,9 +329,9 @@ class Mission:
             )
             self._thinking.add_done_callback(lambda _: self._wake.set())
         target = navigator.due(remaining, speed)
-        if self._resend or (target is not None and not await self._send(self.helm.latlon(target))):
+        if self.resend or (target is not None and not await self._send(self.helm.latlon(target))):
             await self.clock.sleep(RETRY_S)
-            self._resend = False
+            self.resend = False
             navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
         elif target is not None and self._hit_at is not None:
             self.flight.latencies_s.append(time.perf_counter() - self._hit_at)
@@ -384,14 +380,14 @@ class Mission:
         while self.state == state:
             if self.helm.distance(self.helm.here(), point) <= self.settings.flight.corner_m:
                 return True
-            if not sent or self._resend:
+            if not sent or self.resend:
                 await self.clock.sleep(RETRY_S)
-                self._resend = False
+                self.resend = False
                 sent = self.state == state and await self._send(point, on_way=True)
             await self._tick()
         return False
 
-    # ---- watching the vehicle ----------------------------------------------------------------------------
+    # ---- beside the phases -------------------------------------------------------------------------------
 
     async def _guard(self) -> None:
         """Ten times a second: can the position be trusted, is the waypoint flown, is there too much wind?"""
@@ -406,50 +402,6 @@ class Mission:
                 self.why_stopped = why
                 await self.happen(Event.RETURN, why)
             await self.clock.sleep(TICK_S)
-
-    async def _watch(self) -> None:
-        """What the vehicle does by itself: the pilot's mode changes, a lost link, landing."""
-        stalled_at = 0.0
-        async for event in self.vehicle.events():
-            if isinstance(event, ModeChanged):
-                await self._write("mode", {"mode": event.mode, "commanded": event.commanded})
-            elif isinstance(event, Stalled):
-                stalled_at, self._resend = event.time, True
-            elif isinstance(event, TargetNotTaken):
-                await self._write("not taken", {"lat": event.target.lat, "lon": event.target.lon})
-                if event.time != stalled_at:  # given up because we stood still: it is sent again
-                    await self._not_taken(event)
-            elif isinstance(event, TargetTaken):
-                self._refused = 0
-            elif isinstance(event, LinkLost):
-                await self.hold("link", "the autopilot is silent")
-            why = self._takeovers.read(event, landing=self.state == State.RETURNING)
-            if why and not await self.happen(Event.PILOT, why) and self.state == State.YIELDED:
-                self.why_here += f"; {why}"
-                await self._write("yielded", {"reason": why})
-            told = not self.vehicle.events_waiting  # else why it landed may be among what is still to be read
-            if told and self.state in (State.YIELDED, State.HOLDING) and self.helm.on_ground():
-                why = f"landed before the search was over: {self.why_here}"
-                said = self._takeovers.said()  # often told only after the mode has changed
-                self.why_stopped = self.why_stopped or why + (said if said not in why else "")
-                await self.happen(Event.LANDED, "on the ground, disarmed")
-
-    async def _not_taken(self, event: TargetNotTaken) -> None:
-        """The autopilot does not fly to the waypoint: hold, for what that is most likely due to.
-
-        On a bad radio a waypoint may get lost as often as it is repeated, so another one is tried first.
-        """
-        self._refused += 1
-        if self.state not in MOVING:
-            log.warning("the stop is not flown: %s", event.reason)
-        elif not self.helm.heard():
-            await self.hold("link", "the autopilot is silent")
-        elif doubts := self.helm.doubts():
-            await self.hold("position", "; ".join(doubts))
-        elif self._refused < REFUSALS:
-            self._resend = True
-        else:
-            await self.hold("target", f"the waypoint is not flown: {event.reason}")
 
     async def _keep_track(self) -> None:
         """The track, once a second."""

@@ -6,9 +6,9 @@ import math
 
 from service.clock import Clock
 from service.config import FlightSettings
-from service.energy import Consumption, Energy, Metres, WayHome, WindFelt
-from service.flight import LatLon
-from service.helm import Helm
+from service.mission.energy import Consumption, Energy, Metres, WayHome, WindFelt
+from service.mission.flight import LatLon
+from service.mission.helm import Helm
 
 _METRES_PER_DEGREE = 111_194.93
 _MOVED_M = 20.0  # the way home is looked for anew after so many metres

@@ -14,13 +14,13 @@ import numpy as np
 
 from roisearch import FieldOfView
 from service.area import Grid, GridFrame
-from service.calibration import calibration_of
 from service.camera import Detectability, Errors, Flat, Ground, Pinhole, look_at_cells, read_terrain
 from service.camera.sensor import CameraSensor, Mount, nominal_view
 from service.config import Settings
 from service.errors import BadInput
-from service.evidence import Footprint, Pose, Reading, Sensor
-from service.reports import Report
+from service.evidence.calibration import calibration_of
+from service.evidence.observe import Footprint, Pose, Reading, Sensor
+from service.evidence.reports import Report
 
 FIELDS_OF_VIEW: dict[str, Callable[[float, float], FieldOfView]] = {
     "point": FieldOfView.point,

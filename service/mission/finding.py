@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping
 from typing import TYPE_CHECKING
 
-from service.evidence import Pose, finite_or_level
-from service.flight import LatLon
-from service.states import Event, State
+from service.evidence.observe import Pose, finite_or_level
+from service.mission.flight import LatLon
+from service.mission.states import Event, State
 
 if TYPE_CHECKING:
-    from service.mission import Mission
+    from service.mission.mission import Mission
 
 
 class Finding:

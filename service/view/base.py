@@ -10,12 +10,20 @@ from numpy.typing import NDArray
 
 from service.area import SearchArea
 from service.config import Settings
-from service.evidence import Pose
-from service.flight import LatLon
-from service.scene import describe
+from service.evidence.observe import Pose
+from service.evidence.sensors import Profile
+from service.mission.flight import LatLon
 from service.search import Search
-from service.sensors import Profile
-from service.shapes import area_features, cell_features, collection, feature, line, point, region_features
+from service.view.scene import describe
+from service.view.shapes import (
+    area_features,
+    cell_features,
+    collection,
+    feature,
+    line,
+    point,
+    region_features,
+)
 
 
 class BaseView:
@@ -114,7 +122,7 @@ class BaseView:
 
     def picture(self) -> bytes:
         """The map as a PNG."""
-        from service.picture import Scene, draw_scene  # matplotlib: not before somebody looks
+        from service.view.picture import Scene, draw_scene  # matplotlib: not before somebody looks
 
         state = self.state()
         pose, found = state["pose"], state["found"]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from service.pace import ALLOWANCE, climb_seconds
-from service.preview import DRAWS, FIRST_S, Goal, Preview, first_minutes
+from service.preview.pace import ALLOWANCE, climb_seconds
+from service.preview.preview import DRAWS, FIRST_S, Goal, Preview, first_minutes
 
 _MOST_REGIONS = 8
 

@@ -20,14 +20,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from service.clock import Clock
-from service.evidence import Cell, Observation, Pose, Unreadable, observe
+from service.evidence.observe import Cell, Observation, Pose, Unreadable, observe
+from service.evidence.passes import Passes
+from service.evidence.reports import Receipt, Report
+from service.evidence.sensors import Profile
+from service.evidence.verdict import ROW as VERDICT
+from service.evidence.verdict import verdict_on, verdict_row
 from service.journal import Journal
-from service.passes import Passes
-from service.reports import Receipt, Report
 from service.search import Search
-from service.sensors import Profile
-from service.verdict import ROW as VERDICT
-from service.verdict import verdict_on, verdict_row
 
 PoseAt = Callable[[float], Pose | None]
 PIECE, PIECE_S = (

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch import SearchState
-from service.evidence import Footprint, Reading, observe
-from service.navigator import Cell, heading_between
-from service.pace import cell_seconds, leg_seconds
-from service.passes import Passes
+from service.evidence.observe import Footprint, Reading, observe
+from service.evidence.passes import Passes
+from service.mission.navigator import Cell, heading_between
+from service.preview.pace import cell_seconds, leg_seconds
 from service.search import Search
 
 HEED = 8

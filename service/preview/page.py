@@ -9,9 +9,9 @@ import io
 import numpy as np
 from matplotlib.figure import Figure
 
-from service.picture import outline_regions
-from service.preview import FIRST_S, GOALS, Preview
-from service.preview_text import facts
+from service.preview.preview import FIRST_S, GOALS, Preview
+from service.preview.text import facts
+from service.view.picture import outline_regions
 
 
 def draw(seen: Preview) -> bytes:

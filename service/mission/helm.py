@@ -14,12 +14,12 @@ from service.area import Grid, leg_is_clear, way_home
 from service.clock import Clock
 from service.config import Settings
 from service.errors import BadInput
-from service.evidence import grid_heading
-from service.fence import Fence, Straying, height_objection
-from service.flight import LatLon
-from service.limits import Lasting, PositionTrust, Progress, wind_objection
+from service.evidence.observe import grid_heading
 from service.mavlink import LinkError, Vehicle
-from service.navigator import Cell
+from service.mission.fence import Fence, Straying, height_objection
+from service.mission.flight import LatLon
+from service.mission.limits import Lasting, PositionTrust, Progress, wind_objection
+from service.mission.navigator import Cell
 
 log = logging.getLogger("roisearch")
 LEAST_PATIENCE_WALL_S = 1.5

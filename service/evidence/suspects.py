@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from roisearch.place import Place, likely_places
 from service.area.frame import GridFrame
-from service.evidence import Cell, Sighting
+from service.evidence.observe import Cell, Sighting
 
 MOST_SIGHTINGS = 1000
 IN_95_PERCENT = math.sqrt(

@@ -49,6 +49,7 @@ class Event(StrEnum):
 
 
 FLYING = (State.SEARCHING, State.CONFIRMING)
+MOVING = (*FLYING, State.RETURNING)  # on the way to waypoints of ours
 MAY_MOVE = frozenset({State.TAKEOFF, State.SEARCHING, State.CONFIRMING, State.RETURNING})
 FINAL = frozenset({State.DONE, State.ABORTED})
 

@@ -15,11 +15,11 @@ from roisearch import Regions
 from service.area import Grid, SearchArea, way_home
 from service.area.projection import FloatArray
 from service.config import Settings
-from service.energy import Energy, WayHome
 from service.errors import BadInput
-from service.flight import LatLon
-from service.foresight import Foresight, foresee
-from service.pace import climb_seconds, leg_seconds
+from service.mission.energy import Energy, WayHome
+from service.mission.flight import LatLon
+from service.preview.foresight import Foresight, foresee
+from service.preview.pace import climb_seconds, leg_seconds
 from service.search import Search
 
 GOALS = (0.5, 0.75, 0.95)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
-from service.helm import LEAST_PATIENCE_WALL_S
-from service.limits import hold_objection
-from service.states import Event, State
+from service.mission.helm import LEAST_PATIENCE_WALL_S
+from service.mission.limits import hold_objection
+from service.mission.states import Event, State
 
 if TYPE_CHECKING:
-    from service.mission import Mission
+    from service.mission.mission import Mission
 
 BLIND = {"link", "position"}  # causes of a hold during which the aircraft cannot be sent home either
 

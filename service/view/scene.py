@@ -6,7 +6,7 @@ from typing import Any
 
 from service.area import SearchArea
 from service.search import Search
-from service.shapes import area_features, collection
+from service.view.shapes import area_features, collection
 
 
 def describe(area: SearchArea, search: Search, outlines: list[dict[str, Any]]) -> dict[str, Any]:

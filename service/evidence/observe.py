@@ -2,7 +2,7 @@
 
 A frame shows the cells of the field of view around the aircraft at the moment of capture. It counts as a look
 only when the aircraft was well enough centred on its cell for the footprint to cover the cells (`covered`),
-and high enough. How many looks the frames of the same ground are, `service.passes` decides.
+and high enough. How many looks the frames of the same ground are, `service.evidence.passes` decides.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from roisearch import FieldOfView
 from service.area.frame import GridFrame
-from service.calibration import Calibration
 from service.camera.locate import Spot, spread_hits
-from service.passes import Look, Passes
-from service.reports import Report
+from service.evidence.calibration import Calibration
+from service.evidence.passes import Look, Passes
+from service.evidence.reports import Report
 
 HEADINGS = ("north", "east", "south", "west")
 Cell = tuple[int, int]
@@ -29,7 +29,7 @@ Cell = tuple[int, int]
 @dataclass(frozen=True)
 class Pose:
     """Where the aircraft was: degrees, metres above launch, seconds; nose from true north, up, and right wing
-    down, as `service.reports` says."""
+    down, as `service.evidence.reports` says."""
 
     lat: float
     lon: float

@@ -11,21 +11,21 @@ from typing import Any
 from prometheus_client import CollectorRegistry, Gauge, Histogram
 
 from service.area import SearchArea
-from service.base_view import BaseView
 from service.clock import Clock
 from service.config import Settings
-from service.curve import PosCurve
-from service.estimate import Estimator
-from service.evidence import Pose, finite_or_level
-from service.feed import Moment
-from service.flight import LatLon
-from service.intake import Intake
+from service.evidence.intake import Intake
+from service.evidence.observe import Pose, finite_or_level
+from service.evidence.reports import Receipt, Report
+from service.evidence.sensors import Profile
 from service.journal import read_last
-from service.mission import Mission
-from service.reports import Receipt, Report
+from service.mission.flight import LatLon
+from service.mission.mission import Mission
+from service.mission.states import FINAL, State
 from service.search import Search
-from service.sensors import Profile
-from service.states import FINAL, State
+from service.view.base import BaseView
+from service.view.curve import PosCurve
+from service.view.estimate import Estimator
+from service.view.feed import Moment
 
 UNDER_WAY = (State.SEARCHING, State.CONFIRMING, State.HOLDING)
 LEAST_STEPS = 20  # so many cells have to be flown for their pace to tell something

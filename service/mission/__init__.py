@@ -1,0 +1,1 @@
+"""The flight: one state machine, and everything that speaks for or against moving the aircraft."""

@@ -1,0 +1,1 @@
+"""What a search will be like, before it is flown."""

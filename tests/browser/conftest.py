@@ -26,9 +26,9 @@ PICTURES = os.environ.get("ROISEARCH_PICTURES")
 """Where to write the README's pictures; they are not made unless this is set."""
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Browser]:
-    """The system's Chromium."""
+    """The system's Chromium; for one file only, since Playwright's event loop would be in the way of other tests."""
     path = shutil.which("chromium")
     assert path is not None, "the browser tests need Debian's chromium: apt-get install chromium"
     with sync_playwright() as playwright:

@@ -55,6 +55,8 @@ def losing_answers(address: str, lost: int) -> Iterator[str]:
                     request += more
                     server.sendall(more)
                 answer = server.recv(1 << 20)
+                while answer and not whole(answer):  # head and body may come apart
+                    answer += server.recv(1 << 20)
                 if request.startswith(b"POST /api/reports") and left:
                     left -= 1
                     return

@@ -60,7 +60,9 @@ def test_it_flies_home_while_the_battery_has_what_that_needs(tmp_path: Path) -> 
 def test_an_aircraft_that_is_blown_out_of_the_area_flies_home(tmp_path: Path) -> None:
     with flight(tmp_path, "ardupilot") as scene:
         scene.searching()
-        scene.control.fault("wind", east=-20.0, seconds=20.0)
+        scene.control.fault(
+            "wind", east=-35.0, seconds=20.0
+        )  # across the area sooner than it counts as stuck
         scene.reaches("RETURNING", "outside the area and its margin")
 
 

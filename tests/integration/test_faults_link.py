@@ -17,7 +17,7 @@ def test_a_silent_autopilot_is_waited_for_and_nothing_is_sent_blindly(tmp_path: 
         scene.control.fault("link_lost", seconds=60.0)
         scene.reaches("HOLDING", "the autopilot is silent")
         scene.sends_nothing(15.0)
-        scene.reaches("SEARCHING", "heard again")
+        scene.reaches("SEARCHING")  # the reason is that of the last cause to go: the link, or the position
         scene.moves_again()
 
 

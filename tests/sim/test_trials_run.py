@@ -143,7 +143,7 @@ def test_a_scheduler_that_is_not_there_is_named(tmp_path, capsys, monkeypatch):
 
 def test_an_interrupt_writes_what_there_is_and_says_how_to_go_on(tmp_path):
     process = subprocess.Popen(
-        command(tmp_path, "--jobs", "1", "--cap", "20000"),
+        command(tmp_path, "--jobs", "1", "--cap", "20000", "--trials", "300"),
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,

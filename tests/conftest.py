@@ -11,6 +11,24 @@ settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
 
+FLIGHTS = (
+    "tests/browser/",
+    "tests/conformance/test_over_sockets",
+    "tests/integration/",
+    "tests/service/test_mavlink_vehicle",
+    "tests/sim/test_autopilot_mav",
+    "tests/sim/test_bench",
+)
+"""Files whose tests keep time with other processes: one at a time, whatever the other worker computes meanwhile."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """With `-n 2 --dist loadgroup`, one worker flies and the other takes a file at a time."""
+    for item in items:
+        file = item.nodeid.partition("::")[0]
+        item.add_marker(pytest.mark.xdist_group("flights" if file.startswith(FLIGHTS) else file))
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """In CI a test that is skipped, for whatever part is missing, is a failure."""
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")

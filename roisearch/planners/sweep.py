@@ -15,7 +15,7 @@ from roisearch.fov import HEADINGS, MOVES, FieldOfView, heading_index
 from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
-from roisearch.planners.base import Progress, Scene, World
+from roisearch.planners.base import Progress, Scene, World, remark_on
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions, segment_regions
 
@@ -435,7 +435,7 @@ class SweepPlanner:
             value=-scale * expected,
             effort=Effort(iterations, time.perf_counter() - began),
             unreachable=unreachable,
-            remark=remark(unreachable),
+            remark=remark_on(unreachable),
             options=options,
         )
 
@@ -466,13 +466,6 @@ class SweepPlanner:
         plans.extend(
             *self._pose, self._chart, self._tree, self._rules, self._labels, self._home, 80, self._wave
         )
-
-
-def remark(unreachable: float) -> str:
-    """What the operator should hear about ground that cannot be seen."""
-    if unreachable <= 0.0:
-        return ""
-    return f"{unreachable:.2%} of the probability lies where the drone cannot look; it searches the rest"
 
 
 def spread_of(fov: FieldOfView) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

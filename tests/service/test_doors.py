@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import getpass
 import json
+import os
 import shutil
 import socket
 import stat
@@ -235,15 +236,21 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin")
+needs_mosquitto = pytest.mark.skipif(
+    MOSQUITTO is None, reason="NO MOSQUITTO: THE MQTT DOOR HAS NOT BEEN OPENED (apt-get install mosquitto)"
+)
+
+
 @contextmanager
 def mosquitto(folder: Path, port: int, *more: str) -> Iterator[None]:
     """Debian's broker on a port."""
-    program = shutil.which("mosquitto") or "/usr/sbin/mosquitto"
+    assert MOSQUITTO is not None
     file = folder / "mosquitto.conf"
     file.write_text(
         "\n".join([f"listener {port} 127.0.0.1", "persistence false", f"user {getpass.getuser()}", *more, ""])
     )
-    broker = subprocess.Popen([program, "-c", str(file)], stderr=subprocess.DEVNULL)
+    broker = subprocess.Popen([MOSQUITTO, "-c", str(file)], stderr=subprocess.DEVNULL)
     try:
         deadline = time.monotonic() + PATIENCE_S
         while True:
@@ -281,6 +288,7 @@ async def until_answered(client: aiomqtt.Client, topic: str) -> None:
                     return
 
 
+@needs_mosquitto
 def test_reports_published_to_a_broker_are_answered_on_the_topic_of_receipts(tmp_path: Path) -> None:
     port, taker = free_port(), Taker()
 
@@ -302,6 +310,7 @@ def test_reports_published_to_a_broker_are_answered_on_the_topic_of_receipts(tmp
     assert taker.ids[1:] == [f"m{number}" for number in range(200)]
 
 
+@needs_mosquitto
 def test_a_broker_that_comes_late_or_goes_away_is_called_again_with_name_and_password(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -22,11 +22,10 @@ FLIGHTS = (
 """Files whose tests keep time with other processes: one at a time, whatever the other worker computes meanwhile."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_itemcollected(item: pytest.Item) -> None:
     """With `-n 2 --dist loadgroup`, one worker flies and the other takes a file at a time."""
-    for item in items:
-        file = item.nodeid.partition("::")[0]
-        item.add_marker(pytest.mark.xdist_group("flights" if file.startswith(FLIGHTS) else file))
+    file = item.nodeid.partition("::")[0]
+    item.add_marker(pytest.mark.xdist_group("flights" if file.startswith(FLIGHTS) else file))
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -147,6 +147,9 @@ def test_an_interrupt_writes_what_there_is_and_says_how_to_go_on(tmp_path):
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(
+            signal.SIGINT, signal.SIG_DFL
+        ),  # a shell's background job ignores it
     )
     journal = tmp_path / "journal.jsonl"
     give_up = time.monotonic() + 120

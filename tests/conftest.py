@@ -1,6 +1,7 @@
 """What holds for all tests."""
 
 import os
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -22,10 +23,17 @@ FLIGHTS = (
 """Files whose tests keep time with other processes: one at a time, whatever the other worker computes meanwhile."""
 
 
-def pytest_itemcollected(item: pytest.Item) -> None:
-    """With `-n 2 --dist loadgroup`, one worker flies and the other takes a file at a time."""
-    file = item.nodeid.partition("::")[0]
-    item.add_marker(pytest.mark.xdist_group("flights" if file.startswith(FLIGHTS) else file))
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With `-n 2`, one worker flies and the other takes a file at a time."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class OneFlies(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return "flights" if file.startswith(FLIGHTS) else file
+
+    return OneFlies(config, log)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

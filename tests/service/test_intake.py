@@ -9,30 +9,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from roisearch import Belief, FieldOfView
-from roisearch.detection import DetectionRecord
-from service.area import GridFrame
+from roisearch import FieldOfView
 from service.clock import Clock
 from service.evidence.intake import Intake, JournalLost
-from service.evidence.observe import Observation, Pose, Sensor
+from service.evidence.observe import Pose, Sensor
 from service.evidence.reports import Detection, Report
 from service.journal import Journal, read_rows
-
-FRAME = GridFrame(47.05, 8.30, 0.0, 25.0, 20, 30, -375.0, 250.0)
-
-
-class Ground:
-    """What the intake needs of a search: something that an observation is applied to."""
-
-    def __init__(self) -> None:
-        self.belief = Belief(np.ones(FRAME.shape))
-        self.record = DetectionRecord(np.ones(FRAME.shape))
-
-    def apply(self, observation: Observation) -> None:
-        self.belief.observe(observation.cells, observation.hits, observation.p_tp, observation.p_tn)
+from tests.service.reporting import FRAME, Ground
 
 
 def over(row: float, col: float) -> Pose:

@@ -24,7 +24,9 @@ MISSION = """QGC WPL 110
 2\t0\t3\t16\t0\t0\t0\t0\t47.398200\t8.545800\t20\t1
 """
 
-pytestmark = pytest.mark.skipif(MAVPROXY is None, reason="MAVProxy is not installed")
+pytestmark = pytest.mark.skipif(
+    MAVPROXY is None, reason="NO MAVPROXY: NO OTHER GROUND STATION HAS FLOWN THE MOCK (pip install MAVProxy)"
+)
 
 
 class Terminal:

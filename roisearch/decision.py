@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +38,18 @@ class Alternative:
     region: int | None
 
 
-@dataclass(frozen=True, slots=True)
-class Effort:
+class Effort(NamedTuple):
     """What the decision cost: iterations of the search, and seconds."""
 
     iterations: int
     seconds: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Decision:
-    """The cells to enter next, and why.
+_NO_OPTIONS = np.empty((0, 2))
+
+
+class Decision(NamedTuple):
+    """The cells to enter next, and why. A named tuple, as making one must cost next to nothing.
 
     Attributes:
         path: cells in order, each a neighbour of the last, the first a neighbour of the drone; never empty. Of a
@@ -69,7 +71,7 @@ class Decision:
     unreachable: float = 0.0
     remark: str = ""
     goal: Cell | None = None
-    options: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)), repr=False)
+    options: NDArray[np.float64] = _NO_OPTIONS
 
     @property
     def alternatives(self) -> tuple[Alternative, ...]:

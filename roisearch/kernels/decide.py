@@ -1,7 +1,4 @@
-"""The one compiled call of a decision: goals, search, choice, and the cells to enter.
-
-It takes plain arrays, because a named tuple is slow to hand over from Python, and groups them into records.
-"""
+"""The one compiled call of a decision: goals, search, choice, and the cells to enter."""
 
 from __future__ import annotations
 
@@ -11,6 +8,7 @@ from numpy.typing import NDArray
 from roisearch.kernels.compiled import kernel
 from roisearch.kernels.goals import set_goals
 from roisearch.kernels.ground import col_step, row_step
+from roisearch.kernels.handover import Layout, array
 from roisearch.kernels.puct import search
 from roisearch.kernels.records import (
     N_A,
@@ -18,18 +16,76 @@ from roisearch.kernels.records import (
     VALUE_A,
     VISITS,
     Aims,
-    Bits,
     Floats,
     Forest,
-    Ints,
     Land,
     Mass,
     Rules,
     Sight,
-    Steps,
     Tree,
 )
 from roisearch.kernels.trips import walk_trip
+
+GIVEN = Layout(
+    # the regions as trees, see `Forest`; [regions] each region's tree and number of cells
+    cell_of=(np.int64, 1),
+    first=(np.int64, 1),
+    last=(np.int64, 1),
+    box=(np.int64, 2),
+    roots=(np.int64, 1),
+    sizes=(np.int64, 1),
+    # see `Land`, `Sight`, `Mass`
+    legal=(np.uint8, 1),
+    cols=np.int64,
+    offsets=(np.int64, 3),
+    gains=(np.float64, 1),
+    miss=(np.float64, 1),
+    is_point=np.bool_,
+    fade=(np.float64, 1),
+    fades=np.bool_,
+    log=(np.int64, 1),
+    # see `Aims`
+    goals=(np.int64, 2),
+    sources=(np.int64, 3),
+    counts=(np.int64, 1),
+    means=(np.float64, 1),
+    centroids=(np.float64, 2),
+    fields=(np.int32, 2),
+    # see `set_goals`
+    goal_rule=np.int64,
+    reach=np.int64,
+    worth=(np.float64, 1),
+    forward=(np.int32, 1),
+    queue=(np.int64, 1),
+    field_goals=(np.int64, 1),
+    stack=(np.int64, 1),
+    # see `Rules`
+    rollout=np.int64,
+    rollout_policy=np.int64,
+    option_reward=np.int64,
+    backup=np.int64,
+    normalise=np.bool_,
+    prior=np.int64,
+    explore=np.float64,
+    discount=np.float64,
+    penalty=np.float64,
+    density=np.float64,
+    alpha=np.float64,
+    floor=np.float64,
+    # see `Tree`
+    child=(np.int32, 2),
+    stats=(np.float64, 3),
+    visits=(np.float64, 1),
+    trail=(np.float64, 2),
+    span=(np.float64, 1),
+    decay=(np.float64, 1),
+    # see `choose`, and [2, n] room for the cells to enter
+    choose_by=np.int64,
+    margin=np.float64,
+    shown=(np.float64, 2),
+    path=(np.int64, 2),
+)
+opened = GIVEN.opener()
 
 
 @kernel
@@ -67,89 +123,55 @@ def decide(
     iterations: int,
     held: int,
     scale: float,
-    state: NDArray[np.uint64],
     weights: Floats,
     sums: Floats,
     peaks: Floats,
-    cell_of: Ints,
-    first: Ints,
-    last: Ints,
-    box: Ints,
-    roots: Ints,
-    sizes: Ints,
-    legal: Bits,
-    cols: int,
-    offsets: Ints,
-    gains: Floats,
-    miss: Floats,
-    is_point: bool,
-    reach: int,
-    fade: Floats,
-    fades: bool,
-    log: Ints,
-    goals: Ints,
-    sources: Ints,
-    counts: Ints,
-    means: Floats,
-    centroids: Floats,
-    fields: Steps,
-    field_goals: Ints,
-    forward: Steps,
-    queue: Ints,
-    stack: Ints,
-    worth: Floats,
-    goal_rule: int,
-    choose_by: int,
-    margin: float,
-    rollout: int,
-    rollout_policy: int,
-    option_reward: int,
-    backup: int,
-    normalise: bool,
-    prior: int,
-    explore: float,
-    discount: float,
-    penalty: float,
-    density: float,
-    alpha: float,
-    floor: float,
-    child: Steps,
-    stats: Floats,
-    visits: Floats,
-    trail: Floats,
-    span: Floats,
-    decay: Floats,
-    shown: Floats,
-    path: Ints,
+    state: NDArray[np.uint64],
+    parcel: int,
 ) -> tuple[int, int, int]:
     """Search from `cell`, or on when `nodes` > 0: nodes in the tree, chosen action, cells in `path`.
 
-    What the arrays are: `kernels.records`. `roots` and `sizes` [regions] are each region's tree and number of
-    cells; `held` is an action to keep unless another is clearly better, -1 for none.
+    Args:
+        held: an action to keep unless another is clearly better, -1 for none.
+        scale: what makes a weight a probability.
+        weights, sums, peaks: the belief's, and of the nodes of the forest.
+        state: uint64 [1], of the random numbers.
+        parcel: address of what was packed by `GIVEN`.
     """
-    land = Land(legal, weights.size // cols, cols)
-    sight = Sight(offsets, gains, miss, is_point)
-    mass = Mass(weights, fade, fades, log)
-    aims = Aims(goals, sources, counts, means, centroids, fields)
-    rules = Rules(
-        rollout, rollout_policy, option_reward, backup, normalise, prior, explore, discount, penalty, density,
-        alpha, floor, scale,
+    given = opened(parcel)
+    cols = given.cols
+    land = Land(array(given.legal), weights.size // cols, cols)
+    sight = Sight(array(given.offsets), array(given.gains), array(given.miss), given.is_point)
+    fades, log = given.fades, array(given.log)
+    mass = Mass(weights, array(given.fade), fades, log)
+    aims = Aims(
+        array(given.goals), array(given.sources), array(given.counts), array(given.means),
+        array(given.centroids), array(given.fields),
     )  # fmt: skip
-    tree = Tree(child, stats, visits, trail, span, decay)
+    rules = Rules(
+        given.rollout, given.rollout_policy, given.option_reward, given.backup, given.normalise, given.prior,
+        given.explore, given.discount, given.penalty, given.density, given.alpha, given.floor, scale,
+    )  # fmt: skip
+    tree = Tree(
+        array(given.child), array(given.stats), array(given.visits), array(given.trail),
+        array(given.span), array(given.decay),
+    )  # fmt: skip
     row, col = cell // cols, cell % cols
     if nodes == 0:
-        forest = Forest(cell_of, first, last, box, peaks)
+        roots, sizes = array(given.roots), array(given.sizes)
+        forest = Forest(array(given.cell_of), array(given.first), array(given.last), array(given.box), peaks)
         set_goals(
-            goal_rule, row, col, roots, weights, forest, land, sight, reach, worth, forward, queue,
-            field_goals, stack, aims,
+            given.goal_rule, row, col, roots, weights, forest, land, sight, given.reach, array(given.worth),
+            array(given.forward), array(given.queue), array(given.field_goals), array(given.stack), aims,
         )  # fmt: skip
         for region in range(roots.size):
-            means[region] = sums[roots[region]] / sizes[region] if roots[region] >= 0 else 0.0
+            aims.means[region] = sums[roots[region]] / sizes[region] if roots[region] >= 0 else 0.0
     nodes = search(nodes, iterations, row, col, heading, tree, land, mass, sight, aims, rules, state)
-    action = choose(tree, choose_by, held, margin, shown)
+    action = choose(tree, given.choose_by, held, given.margin, array(given.shown))
+    path = array(given.path)
     if action < 4:
         path[0, 0] = row + row_step(action)
         path[1, 0] = col + col_step(action)
         return nodes, action, 1
-    now = Mass(weights, fade, False, log)
+    now = Mass(weights, mass.fade, False, log)
     return nodes, action, walk_trip(row, col, heading, action - 4, land, now, sight, aims, path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +11,7 @@ from roisearch.belief import Belief
 from roisearch.decision import AHEAD, Cell, Decision, Effort, SearchState, action_name
 from roisearch.forest import ForestSums
 from roisearch.fov import FieldOfView, heading_index
-from roisearch.kernels.decide import decide
+from roisearch.kernels.decide import GIVEN, decide
 from roisearch.planners.base import Progress, Scene, World, cells_of, remark_on
 from roisearch.planners.settings import PuctSettings
 from roisearch.planners.warm import warm_up
@@ -73,57 +72,57 @@ class PuctPlanner:
         self._shown = np.zeros((actions, 2))
         self._path = np.zeros((2, rows + cols + 64 if s.commit == "trip" else AHEAD), dtype=np.int64)
         self._goals = np.full((regions, 3), -1, dtype=np.int64)
-        self._arrays: tuple[Any, ...] = (
-            forest.cell_of,
-            forest.first,
-            forest.last,
-            forest.box,
-            roots,
-            np.maximum(forest.count[:regions], 1),
-            scene.part.legal,
-            cols,
-            fov.offsets,
-            fov.p_tp if s.gain == "detection" else np.ones(k),
-            1.0 - fov.p_tp,
-            fov.is_point,
-            fov.reach,
-            np.ones(cells if s.fades else 1),  # fade
-            s.fades,
-            np.zeros((s.rollout + 8 * (rows + cols)) * k, dtype=np.int64),  # log
-            self._goals,
-            np.zeros((regions, 4 * k, 3), dtype=np.int64),  # sources
-            np.zeros(regions, dtype=np.int64),  # counts
-            np.zeros(regions),  # means
-            scene.centroids[:regions],
-            np.zeros((0 if is_open else regions, cells), dtype=np.int32),  # fields
-            np.full(regions, -1, dtype=np.int64),  # field_goals
-            np.zeros(0 if is_open else cells, dtype=np.int32),  # forward
-            np.zeros(0 if is_open else cells, dtype=np.int64),  # queue
-            np.zeros(144, dtype=np.int64),  # stack: at most 15 siblings a level, 16 ** 9 cells
-            worth,
-            s.code("goal"),
-            s.code("choose"),
-            s.margin,
-            s.rollout,
-            s.code("rollout_policy"),
-            s.code("option_reward"),
-            s.code("backup"),
-            s.normalise,
-            s.code("prior"),
-            s.explore,
-            s.discount,
-            1.0 / cells if s.penalty is None else s.penalty,
-            s.factor / s.area**2,
-            s.alpha,
-            s.floor,
-            np.zeros((nodes, actions), dtype=np.int32),  # child
-            np.zeros((nodes, 5, actions)),  # stats
-            np.zeros(nodes),  # visits
-            np.zeros((s.depth, 4)),  # trail
-            np.zeros(2),  # span
-            np.cumprod(np.concatenate(([1.0], np.full(farthest, s.discount)))),  # decay
-            self._shown,
-            self._path,
+        self._parcel = GIVEN.pack(
+            cell_of=forest.cell_of,
+            first=forest.first,
+            last=forest.last,
+            box=forest.box,
+            roots=roots,
+            sizes=np.maximum(forest.count[:regions], 1),
+            legal=scene.part.legal,
+            cols=cols,
+            offsets=fov.offsets,
+            gains=fov.p_tp if s.gain == "detection" else np.ones(k),
+            miss=1.0 - fov.p_tp,
+            is_point=fov.is_point,
+            reach=fov.reach,
+            fade=np.ones(cells if s.fades else 1),
+            fades=s.fades,
+            log=np.zeros((s.rollout + 8 * (rows + cols)) * k, dtype=np.int64),
+            goals=self._goals,
+            sources=np.zeros((regions, 4 * k, 3), dtype=np.int64),
+            counts=np.zeros(regions, dtype=np.int64),
+            means=np.zeros(regions),
+            centroids=scene.centroids[:regions],
+            fields=np.zeros((0 if is_open else regions, cells), dtype=np.int32),
+            field_goals=np.full(regions, -1, dtype=np.int64),
+            forward=np.zeros(0 if is_open else cells, dtype=np.int32),
+            queue=np.zeros(0 if is_open else cells, dtype=np.int64),
+            stack=np.zeros(144, dtype=np.int64),  # at most 15 siblings a level, 16 ** 9 cells
+            worth=worth,
+            goal_rule=s.code("goal"),
+            choose_by=s.code("choose"),
+            margin=s.margin,
+            rollout=s.rollout,
+            rollout_policy=s.code("rollout_policy"),
+            option_reward=s.code("option_reward"),
+            backup=s.code("backup"),
+            normalise=s.normalise,
+            prior=s.code("prior"),
+            explore=s.explore,
+            discount=s.discount,
+            penalty=1.0 / cells if s.penalty is None else s.penalty,
+            density=s.factor / s.area**2,
+            alpha=s.alpha,
+            floor=s.floor,
+            child=np.zeros((nodes, actions), dtype=np.int32),
+            stats=np.zeros((nodes, 5, actions)),
+            visits=np.zeros(nodes),
+            trail=np.zeros((s.depth, 4)),
+            span=np.zeros(2),
+            decay=np.cumprod(np.concatenate(([1.0], np.full(farthest, s.discount)))),
+            shown=self._shown,
+            path=self._path,
         )
 
     def plan(
@@ -161,8 +160,8 @@ class PuctPlanner:
             if deadline_s is not None:
                 chunk = min(chunk, _CHUNK)
             nodes, action, length = decide(
-                at, heading, nodes, chunk, held, scale, self._random, belief.weights, sums.sums, sums.peaks,
-                *self._arrays,
+                at, heading, nodes, chunk, held, scale, belief.weights, sums.sums, sums.peaks, self._random,
+                self._parcel.address,
             )  # fmt: skip
             done += chunk
             if done == most or (deadline_s is not None and time.perf_counter() - began >= deadline_s):

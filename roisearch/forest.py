@@ -96,6 +96,16 @@ class ForestSums:
         self.forest = forest
         self.sums = sums
         self.peaks = peaks
+        self._parcel = kernels.TOUCHED.pack(
+            cols=forest.shape[1],
+            cell_of=forest.cell_of,
+            slot_of=forest.slot_of,
+            first=forest.first,
+            last=forest.last,
+            parent=forest.parent,
+            sums=sums,
+            peaks=peaks,
+        )
 
     def grow(self, weights: NDArray[np.float64]) -> None:
         """Recompute everything."""
@@ -104,10 +114,7 @@ class ForestSums:
 
     def touch(self, cells: NDArray[np.int64], weights: NDArray[np.float64]) -> None:
         """Recompute what depends on `cells` [k, 2]."""
-        f = self.forest
-        kernels.touch(
-            cells, f.shape[1], weights, f.cell_of, f.slot_of, f.first, f.last, f.parent, self.sums, self.peaks
-        )
+        kernels.touch(cells, weights, self._parcel.address)
 
     def copy(self) -> ForestSums:
         """An independent copy for a copied belief."""

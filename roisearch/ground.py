@@ -46,6 +46,10 @@ class Ground:
         self._parts: dict[int, Part] = {}
         self._labels: NDArray[np.int32] | None = None
 
+    def holds(self, cell: Cell) -> bool:
+        """Whether `cell` is on the map."""
+        return 0 <= cell[0] < self.shape[0] and 0 <= cell[1] < self.shape[1]
+
     def part_of(self, cell: Cell) -> Part:
         """The connected part that `cell` lies on.
 
@@ -53,7 +57,7 @@ class Ground:
             ValueError: when the drone cannot be in that cell, or cannot leave it.
         """
         rows, cols = self.shape
-        if not (0 <= cell[0] < rows and 0 <= cell[1] < cols):
+        if not self.holds(cell):
             raise ValueError(f"the drone's cell {cell} is outside the map of {rows} x {cols} cells")
         if not self.flyable[cell]:
             raise ValueError(f"the drone's cell {cell} is not flyable")

@@ -14,8 +14,23 @@ Arrays (see `roisearch.forest.Forest`): `cell_of` [slots] the cell in a slot, -1
 
 from __future__ import annotations
 
+import numpy as np
+
 from roisearch.kernels.compiled import kernel
+from roisearch.kernels.handover import Layout, array
 from roisearch.kernels.records import Floats, Forest, Ints
+
+TOUCHED = Layout(
+    cols=np.int64,
+    cell_of=(np.int64, 1),
+    slot_of=(np.int64, 1),
+    first=(np.int64, 1),
+    last=(np.int64, 1),
+    parent=(np.int64, 1),
+    sums=(np.float64, 1),
+    peaks=(np.float64, 1),
+)
+opened = TOUCHED.opener()
 
 
 @kernel
@@ -61,21 +76,14 @@ def grow(
 
 
 @kernel
-def touch(
-    cells: Ints,
-    cols: int,
-    weights: Floats,
-    cell_of: Ints,
-    slot_of: Ints,
-    first: Ints,
-    last: Ints,
-    parent: Ints,
-    sums: Floats,
-    peaks: Floats,
-) -> None:
-    """Renew the nodes above the changed `cells` [k, 2]."""
+def touch(cells: Ints, weights: Floats, parcel: int) -> None:
+    """Renew the nodes above the changed `cells` [k, 2]; `parcel` is what `TOUCHED` packed."""
+    given = opened(parcel)
+    cell_of, slot_of, parent = array(given.cell_of), array(given.slot_of), array(given.parent)
+    first, last = array(given.first), array(given.last)
+    sums, peaks = array(given.sums), array(given.peaks)
     for look in range(cells.shape[0]):
-        slot = slot_of[cells[look, 0] * cols + cells[look, 1]]
+        slot = slot_of[cells[look, 0] * given.cols + cells[look, 1]]
         if slot < 0:
             continue
         node = slot >> 4

@@ -26,13 +26,13 @@ def col_step(move: int) -> int:
     return 2 - move if move & 1 == 1 else 0
 
 
-@kernel
+@inlined
 def cell_step(move: int, cols: int) -> int:
     """What a move adds to a cell's number."""
     return 2 - move if move & 1 == 1 else (move - 1) * cols
 
 
-@kernel
+@inlined
 def sees(row: int, col: int, heading: int, goal_row: int, goal_col: int, sight: Sight) -> bool:
     """Whether the goal is in the field of view from (row, col)."""
     if sight.is_point:
@@ -85,7 +85,7 @@ def flood(sources: Ints, start: int, legal: Bits, cols: int, field: Steps, queue
                     tail += 1
 
 
-@kernel
+@inlined
 def open_steps(
     row: int, col: int, goal_row: int, goal_col: int, sources: Ints, count: int, sight: Sight
 ) -> int:
@@ -99,7 +99,7 @@ def open_steps(
     return least
 
 
-@kernel
+@inlined
 def steps_to(row: int, col: int, region: int, cols: int, aims: Aims, sight: Sight) -> int:
     """Steps until the goal of `region` has been looked at; FAR when it cannot be."""
     if aims.fields.shape[0] > 0:

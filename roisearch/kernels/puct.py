@@ -42,14 +42,14 @@ from roisearch.kernels.sensing import fade_at, gain_at, restore
 from roisearch.kernels.trips import trip_move
 
 
-@kernel
+@inlined
 def density(row: int, col: int, region: int, aims: Aims, rules: Rules) -> float:
     """The paper's reward of an option in the lite model: f * mean mass / (A^2 * distance to the centroid)."""
     apart = abs(aims.centroids[region, 0] - row) + abs(aims.centroids[region, 1] - col)
     return float(rules.density * rules.scale * aims.means[region] / max(apart, 1.0))
 
 
-@kernel
+@inlined
 def hope_of_move(row: int, col: int, move: int, land: Land, mass: Mass, sight: Sight, rules: Rules) -> float:
     """What P(a) of a move is made from: its reward, or its index."""
     gain = rules.scale * gain_at(
@@ -60,7 +60,7 @@ def hope_of_move(row: int, col: int, move: int, land: Land, mass: Mass, sight: S
     return gain - rules.penalty
 
 
-@kernel
+@inlined
 def hope_of_option(
     row: int, col: int, region: int, steps: int, mass: Mass, sight: Sight, aims: Aims, rules: Rules
 ) -> float:
@@ -147,7 +147,7 @@ def select(node: int, tree: Tree, rules: Rules) -> int:
     return best
 
 
-@kernel
+@inlined
 def jump(row: int, col: int, heading: int, region: int, land: Land, aims: Aims) -> tuple[int, int, int]:
     """Where the lite model's option ends, at its goal or beside it: row, column, heading."""
     to_row, to_col = aims.goals[region, 1], aims.goals[region, 2]

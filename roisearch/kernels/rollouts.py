@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.ground import cell_step, col_step, row_step
 from roisearch.kernels.records import RANDOM, STEEPEST, Land, Mass, Rules, Sight
 from roisearch.kernels.sensing import fade_at, gain_at
@@ -32,7 +32,7 @@ def draw_unit(state: NDArray[np.uint64]) -> float:
     return float(np.int64(state[0] >> np.uint64(11))) * 2.0**-53
 
 
-@kernel
+@inlined
 def random_look(
     row: int, col: int, land: Land, mass: Mass, sight: Sight, rules: Rules, state: NDArray[np.uint64]
 ) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roisearch.kernels.compiled import inlined, kernel
+from roisearch.kernels.compiled import inlined
 from roisearch.kernels.records import Mass, Sight
 
 
@@ -27,7 +27,7 @@ def gain_at(row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, 
     return total
 
 
-@kernel
+@inlined
 def fade_at(
     row: int, col: int, heading: int, rows: int, cols: int, mass: Mass, sight: Sight, logged: int
 ) -> int:
@@ -47,7 +47,7 @@ def fade_at(
     return logged
 
 
-@kernel
+@inlined
 def restore(mass: Mass, logged: int) -> None:
     """Undo all fading that is in the log."""
     for i in range(logged):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from roisearch.kernels.compiled import kernel
+from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.ground import col_step, row_step, sees, steps_to
 from roisearch.kernels.records import FAR, Aims, Ints, Land, Mass, Sight
 from roisearch.kernels.sensing import gain_at
 
 
-@kernel
+@inlined
 def trip_move(
     row: int, col: int, heading: int, region: int, land: Land, mass: Mass, sight: Sight, aims: Aims
 ) -> tuple[int, bool]:

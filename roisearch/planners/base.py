@@ -102,6 +102,7 @@ class World:
         self._regions = regions
         self._ground: Ground | None = None
         self._scenes: dict[int, Scene] = {}
+        self._whole: Scene | None = None  # the only one there can be, on open ground
 
     def scene(self, belief: Belief, cell: Cell) -> Scene:
         """The scene around `cell`; the regions are segmented from the first belief unless they were given.
@@ -109,6 +110,9 @@ class World:
         Raises:
             ValueError: when the shapes disagree or the drone cannot be in that cell.
         """
+        whole = self._whole
+        if whole is not None and belief.shape == whole.ground.shape and whole.ground.holds(cell):
+            return whole
         if self._ground is None:
             self._ground = Ground(belief.shape, self._flyable, self.fov)
         elif self._ground.shape != belief.shape:
@@ -117,6 +121,7 @@ class World:
         scene = self._scenes.get(part.label)
         if scene is None:
             scene = self._scenes[part.label] = self._survey(belief, self._ground, part)
+            self._whole = scene if self._ground.is_open else None
         return scene
 
     def _survey(self, belief: Belief, ground: Ground, part: Part) -> Scene:

@@ -46,7 +46,8 @@ class Scene:
             vehicle=SimpleNamespace(in_control=True, telemetry=SimpleNamespace(guided=True)),
             happen=self.happen,
         )
-        self.finding = Finding(self.mission, write=self.write, tick=self.tick, energy_low=lambda: "")
+        self.low = ""
+        self.finding = Finding(self.mission, write=self.write, tick=self.tick, energy_low=lambda: self.low)
 
     async def happen(self, event: Event, reason: str) -> bool:
         self.mission.state = next_state(self.mission.state, event)
@@ -84,6 +85,29 @@ def test_a_posterior_over_the_level_ends_the_search_unless_it_is_to_continue(
         assert scene.mission.found.probability >= 0.999
         await scene.finding.look()
         assert scene.rows == ["found"]  # and not once a tick
+
+    asyncio.run(fly())
+
+
+def test_hovering_over_what_was_found_ends_with_the_energy_for_the_way_home(tmp_path: Path) -> None:
+    async def fly() -> None:
+        scene = Scene(tmp_path, "hover")
+        hovered: list[State] = []
+
+        async def hover(wanted: object) -> None:
+            hovered.append(scene.mission.state)
+
+        scene.mission.helm = SimpleNamespace(hover=hover)
+        scene.hit()
+        assert await scene.finding.look()
+        waiting = asyncio.create_task(scene.finding.wait_over_the_place())
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert (hovered, scene.mission.state) == ([State.FOUND], State.FOUND)
+        scene.low = "the way home needs 31 %"
+        async with asyncio.timeout(1.0):
+            await waiting
+        assert (scene.mission.state, scene.mission.why_stopped) == (State.RETURNING, scene.low)
 
     asyncio.run(fly())
 

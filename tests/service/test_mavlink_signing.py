@@ -284,7 +284,7 @@ def test_what_is_no_key_is_refused_without_being_shown(tmp_path: Path, content: 
     file.write_bytes(content)
     with pytest.raises(BadInput, match=words) as caught:
         read_signing_key(str(file))
-    assert not content or repr(content)[2:-1] not in str(caught.value)
+    assert not content or repr(content[:8])[2:-1] not in str(caught.value)
     with pytest.raises(BadInput, match="cannot be read"):
         read_signing_key(str(tmp_path / "none"))
 

@@ -13,7 +13,8 @@ from roisearch.planners.pattern import CoveragePlanner, SpiralPlanner
 from roisearch.planners.policies import DirectPolicySearch
 from roisearch.planners.puct import PuctPlanner
 from roisearch.planners.settings import settings_for
-from roisearch.planners.sweep import SweepPlanner, sweep_settings_for
+from roisearch.planners.sweep import SweepPlanner
+from roisearch.planners.sweep_settings import sweep_settings_for
 
 _SHARED = ("flyable", "regions")
 

@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from roisearch import PLANNERS, Belief, Decision, FieldOfView, Planner, SearchState, make_planner
 from roisearch.bounds import expected_time, multi_cell, release, teleport_reference
 from roisearch.planners.base import Progress
-from roisearch.planners.sweep import SweepPlanner, SweepSettings
+from roisearch.planners.sweep import SweepPlanner
+from roisearch.planners.sweep_settings import SweepSettings
 from sim.ruler import detection_curve
 from sim.scenario import PAPER_START, PAPER_STEPS, paper_prior
 

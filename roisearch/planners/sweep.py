@@ -1,9 +1,9 @@
-"""PUCT over sweeps, the default of `puct-regions-lite`: the settings, and the object that plans."""
+"""PUCT over sweeps, the default of `puct-regions-lite`: the object that plans."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
 from roisearch.planners.base import Progress, Scene, World, remark_on
+from roisearch.planners.looks import Evidence, Watch
+from roisearch.planners.sweep_settings import SweepSettings
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions, segment_regions
 
@@ -25,108 +27,6 @@ PAUSE = 4
 UNSEEN = 0.02
 """A new plan is made when so much of the undetected mass was flown over and not reported."""
 OPTION_BALANCES = ((0.25, 1.0), (0.6, 0.0), (1.0, 0.0), (0.4, 4.0))
-
-
-@dataclass(frozen=True)
-class SweepSettings:
-    """What can be set about the search.
-
-    Attributes:
-        iterations: simulations a decision, at most; None for as many as the deadline allows.
-        patience: simulations in a row without a better plan, over the decisions, after which the plan is
-            flown without thinking, until something is seen that the plan did not expect. When the plan is
-            carried on, thinking resumes for the part of this that the plan leaves undetected.
-        least: part of the mass that was there at first, below which the plan is flown without thinking:
-            what is left lies thin and far apart, and the order of it hardly matters.
-        horizon: steps that a simulation looks ahead.
-        explore: c of the PUCT score.
-        keep: P(a) of keeping to the plan in each node; the other actions share the rest.
-        spread: loss against the plan, in parts of the expected time, at which Q is one half.
-        spacing: steps between the nodes along the plan.
-        chain: probability that a tried line sweeps one more region before the rollout's rule takes over.
-        overhead: steps that clearing the rest after the horizon takes per step of a search without travel.
-        path: the most cells that a decision gives.
-    """
-
-    iterations: int | None = 4
-    patience: int = 150
-    least: float = 0.1
-    horizon: int = 4000
-    explore: float = 1.0
-    keep: float = 0.75
-    spread: float = 0.02
-    spacing: int = 32
-    chain: float = 0.5
-    overhead: float = 1.25
-    path: int = 64
-
-    def __post_init__(self) -> None:
-        if self.iterations is not None and self.iterations < 0:
-            raise ValueError(f"iterations must be 0 or more, not {self.iterations}")
-        for name, least in (("horizon", 64), ("spacing", 1), ("path", 1), ("patience", 1)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
-        for name in ("chain", "least"):
-            if not 0.0 <= getattr(self, name) < 1.0:
-                raise ValueError(f"{name} must be at least 0 and below 1, not {getattr(self, name)}")
-        if not (0.0 < self.keep < 1.0 and self.explore >= 0.0 and self.spread > 0.0 and self.overhead >= 1.0):
-            raise ValueError(
-                "keep must be between 0 and 1, explore 0 or more, spread above 0, overhead at least 1"
-            )
-
-
-def sweep_settings_for(name: str, options: dict[str, Any]) -> SweepSettings:
-    """The settings with single `options` changed.
-
-    Raises:
-        ValueError: when there is no such option, or a value is out of range.
-    """
-    known = sorted(field.name for field in fields(SweepSettings))
-    unknown = sorted(set(options) - set(known))
-    if unknown:
-        raise ValueError(
-            f"{name} has no option '{unknown[0]}'; it has {', '.join(known)}, "
-            "and with preset='trips' those of PuctSettings"
-        )
-    return SweepSettings(**options)
-
-
-class Changes:
-    """The cells of a belief that observations have changed since the last look at this list."""
-
-    def __init__(self, forest: object) -> None:
-        self.forest = forest
-        self.cells: list[NDArray[np.int64]] = []
-        self.all = True
-
-    def touch(self, cells: NDArray[np.int64], weights: NDArray[np.float64]) -> None:
-        """Note that `cells` [k, 2] were looked at."""
-        if len(self.cells) >= 4096:
-            self.all = True
-        if not self.all:
-            self.cells.append(cells.copy())
-
-    def grow(self, weights: NDArray[np.float64]) -> None:
-        """Note that every cell has changed."""
-        self.all = True
-
-    def copy(self) -> Changes:
-        """For a copied belief: everything is new to whoever reads it."""
-        return Changes(self.forest)
-
-    def take(self) -> tuple[bool, list[NDArray[np.int64]]]:
-        """Whether everything may have changed, and the cells that have; the list starts again."""
-        everything, cells = self.all, self.cells
-        self.all, self.cells = False, []
-        return everything, cells
-
-
-class Watch:
-    """Asks a belief to keep `Changes`, as it keeps the sums of a forest."""
-
-    def sums(self, weights: NDArray[np.float64]) -> Changes:
-        """The list for one belief."""
-        return Changes(self)
 
 
 class SweepPlanner:
@@ -349,6 +249,7 @@ class SweepPlanner:
     def _load(self, belief: Belief) -> None:
         """Take over the whole belief."""
         self._belief = belief
+        self._evidence = Evidence(belief.weights)
         self._hits = belief.hits
         self._chart.mass[:] = np.where(self._viewable, belief.weights, 0.0)
         charts.draw_up(self._chart)
@@ -379,9 +280,11 @@ class SweepPlanner:
         return seen
 
     def _correct(self, belief: Belief, cells: NDArray[np.int64]) -> bool:
-        """Set the mass of cells to the belief's; whether any differed."""
+        """Set the mass of cells to what the belief makes of them for the planner; whether any differed."""
         flat = cells[:, 0] * self._chart.cols + cells[:, 1]
-        actual = np.where(self._viewable[flat], belief.weights[flat], 0.0)
+        self._evidence.note(flat, belief.weights[flat])
+        worth = belief.weights[flat] * self._evidence.discount(flat, self.settings.contradicted)
+        actual = np.where(self._viewable[flat], worth, 0.0)
         expected = self._chart.mass[flat]
         wrong = np.flatnonzero(np.abs(actual - expected) > 1e-12 * np.maximum(actual, expected))
         for i in wrong.tolist():

@@ -11,7 +11,8 @@ from roisearch import Belief, FieldOfView, SearchState
 from roisearch.fov import HEADINGS, MOVES
 from roisearch.kernels import chart as charts
 from roisearch.kernels import plans, sweeps
-from roisearch.planners.sweep import SweepPlanner, SweepSettings
+from roisearch.planners.sweep import SweepPlanner
+from roisearch.planners.sweep_settings import SweepSettings
 from roisearch.regions import Regions
 
 FOVS = {"point": FieldOfView.point(), "donut": FieldOfView.donut(), "wide": FieldOfView.wide_angle()}

@@ -9,7 +9,9 @@ import pytest
 
 from roisearch import Belief, FieldOfView, SearchState, make_planner
 from roisearch.fov import HEADINGS, MOVES
-from roisearch.planners.sweep import SweepPlanner, SweepSettings
+from roisearch.planners.sweep import SweepPlanner
+from roisearch.planners.sweep_settings import SweepSettings
+from sim.ruler import detection_curve
 from sim.scenario import paper_prior
 
 FOVS = {"point": FieldOfView.point(), "donut": FieldOfView.donut(), "wide": FieldOfView.wide_angle()}
@@ -48,9 +50,11 @@ def test_it_is_the_default_of_lite_and_the_papers_preset_is_not() -> None:
         )
 
 
-@pytest.mark.parametrize("options", [{"iterations": -1}, {"rollout": 60}, {"keep": 1.0}, {"horizon": 3}])
+@pytest.mark.parametrize(
+    "options", [{"iterations": -1}, {"rollout": 60}, {"keep": 1.0}, {"horizon": 3}, {"contradicted": 2}]
+)
 def test_options_out_of_range_are_refused(options: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=r"keep|iterations|rollout|horizon"):
+    with pytest.raises(ValueError, match=r"keep|iterations|rollout|horizon|contradicted"):
         make_planner("puct-regions-lite", fov=FOVS["point"], **options)
 
 
@@ -112,6 +116,20 @@ def test_it_looks_again_at_a_cell_with_a_hit() -> None:
         belief.observe([state.cell], [False], 0.9, 0.9)
         visited.append(state.cell)
     assert hit in visited
+
+
+def detected(contradicted: float) -> float:
+    """What 300 steps over a hill detect with a tenth of the looks a false alarm, on the mean over the steps."""
+    settings = SweepSettings(iterations=0, horizon=500, contradicted=contradicted)
+    prior = hill((60, 60), (30, 30), 8.0)
+    curve = detection_curve(
+        SweepPlanner(settings, fov=FOVS["point"]), prior, (30, 29), 0.9, 300, np.random.default_rng(1), 0.9
+    )
+    return float(curve.mean())
+
+
+def test_a_hit_that_a_miss_outweighs_is_not_worth_the_way_back() -> None:
+    assert detected(0.2) > 1.01 * detected(1.0)
 
 
 def test_thinking_goes_on_where_it_stopped_when_the_plan_is_flown() -> None:

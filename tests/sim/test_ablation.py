@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from roisearch import FieldOfView
-from roisearch.planners.sweep import SweepPlanner, SweepSettings
+from roisearch.planners.sweep import SweepPlanner
+from roisearch.planners.sweep_settings import SweepSettings
 from sim import ablation
 from sim.ruler import detection_curve
 

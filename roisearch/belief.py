@@ -72,6 +72,9 @@ class Belief:
 
     def _take(self, weights: NDArray[np.float64], outside: float) -> None:
         self._weights = weights
+        self._first = weights.copy()  # never written: all copies of this belief share it
+        self._rescaled = 1.0  # what the weights were multiplied with since
+        self._tally = np.zeros((weights.size, 2), dtype=np.int16)
         self._outside = outside
         self._offsets = tree_offsets(weights.size)
         self._sums = np.empty(int(self._offsets[-1]))
@@ -115,6 +118,14 @@ class Belief:
         mass: NDArray[np.float64] = self._weights[at[:, 0] * self._shape[1] + at[:, 1]] / self.total
         return mass
 
+    def contradicted(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        """How many hits at each of `cells` [k], flat indices, the misses at the same cell outweigh, int [k].
+
+        None while the cell is more probable, beside the others, than before all looks at it.
+        """
+        outweighed = self._weights[cells] <= self._first[cells] * (self._rescaled * (1.0 + 1e-9))
+        return np.where(outweighed, self._tally[cells].min(axis=1), 0).astype(np.int64)
+
     def entropy(self) -> float:
         """How uncertain the belief is, in bits, 'not in the area' being one more place."""
         p = self._weights[self._weights > 0.0] / self.total
@@ -144,7 +155,16 @@ class Belief:
         tp = _numbers(p_tp, k, "p_tp")
         tn = _numbers(p_tn, k, "p_tn")
         status, number = apply_looks(
-            self._weights, self._sums, self._offsets, self._outside, self._shape[1], at, hit, tp, tn
+            self._weights,
+            self._sums,
+            self._offsets,
+            self._tally,
+            self._outside,
+            self._shape[1],
+            at,
+            hit,
+            tp,
+            tn,
         )
         if status != OK:
             self._explain(status, number, at, hit, tp, tn)
@@ -203,6 +223,7 @@ class Belief:
         """Multiply all weights by a power of two (exact) before they run out of exponent."""
         factor = 2.0 ** -round(float(np.log2(self.total)))
         self._weights *= factor
+        self._rescaled *= factor
         self._outside *= factor
         self._renew()
 
@@ -225,6 +246,8 @@ class Belief:
         twin = Belief.__new__(Belief)
         twin._shape = self._shape
         twin._weights = self._weights.copy()
+        twin._first, twin._rescaled = self._first, self._rescaled
+        twin._tally = self._tally.copy()
         twin._outside = self._outside
         twin._offsets = self._offsets
         twin._sums = self._sums.copy()

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from roisearch.kernels.compiled import allocating_kernel, kernel
 
 FANOUT = 16
+MOST_COUNTED = 32_000
 
 OK, OUT_OF_MAP, BAD_PROBABILITY, IMPOSSIBLE, CERTAIN = 0, 1, 2, 3, 4
 
@@ -67,6 +68,7 @@ def apply_looks(
     weights: NDArray[np.float64],
     sums: NDArray[np.float64],
     offsets: NDArray[np.int64],
+    tally: NDArray[np.int16],
     outside: float,
     cols: int,
     cells: NDArray[np.int64],
@@ -78,6 +80,7 @@ def apply_looks(
 
     Args:
         weights: [rows * cols], changed in place; `sums` and `offsets` as in this module's first lines.
+        tally: [cells, 2], the misses and hits so far, changed in place; at MOST_COUNTED it stays.
         outside: weight of 'not in the area'; no look changes it.
         cells: row and column, [k, 2].
         hits, p_tp, p_tn: [k], or [1] for all looks alike.
@@ -110,6 +113,9 @@ def apply_looks(
             weights[cell] *= (1.0 - tp) / tn
         resum(cell, weights, sums, offsets)
     if sums[-1] + outside > 0.0 and np.isfinite(sums[-1]):
+        for look in range(cells.shape[0]):
+            cell, kind = cells[look, 0] * cols + cells[look, 1], 1 if hits[look % hits.size] else 0
+            tally[cell, kind] = min(tally[cell, kind] + 1, MOST_COUNTED)
         return OK, found
     for look in range(cells.shape[0] - 1, -1, -1):
         cell = cells[look, 0] * cols + cells[look, 1]

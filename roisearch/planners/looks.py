@@ -42,34 +42,3 @@ class Watch:
     def sums(self, weights: NDArray[np.float64]) -> Changes:
         """The list for one belief."""
         return Changes(self)
-
-
-class Evidence:
-    """How the looks at each cell contradict each other.
-
-    A false alarm and the miss at the next look leave a cell where it was before both, and it is as much worth a look
-    as its neighbours. But they lie in the drone's way, while coming back for a single cell takes two steps or more.
-    So a planner may count such a cell for less. A cell whose hits outweigh its misses counts whole, and in the belief
-    every cell does.
-
-    Args:
-        weights: float [cells], the belief's, before the looks.
-    """
-
-    def __init__(self, weights: NDArray[np.float64]) -> None:
-        self._first = weights.copy()
-        self._last = weights.copy()
-        self._hits = np.zeros(weights.size, dtype=np.int32)
-        self._misses = np.zeros(weights.size, dtype=np.int32)
-
-    def note(self, cells: NDArray[np.int64], weights: NDArray[np.float64]) -> None:
-        """Note the belief's new `weights` [k] of `cells` [k], flat and all different."""
-        self._hits[cells] += weights > self._last[cells]
-        self._misses[cells] += weights < self._last[cells]
-        self._last[cells] = weights
-
-    def discount(self, cells: NDArray[np.int64], share: float) -> NDArray[np.float64]:
-        """What to multiply the weights of `cells` [k] with: `share` for each hit and a miss against it."""
-        outweighed = self._last[cells] <= self._first[cells] * (1.0 + 1e-9)
-        pairs = np.minimum(self._hits[cells], self._misses[cells])
-        return np.power(share, np.where(outweighed, pairs, 0))

@@ -16,7 +16,7 @@ from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
 from roisearch.planners.base import Progress, Scene, World, remark_on
-from roisearch.planners.looks import Evidence, Watch
+from roisearch.planners.looks import Watch
 from roisearch.planners.sweep_settings import SweepSettings
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions, segment_regions
@@ -214,10 +214,13 @@ class SweepPlanner:
         changes: Any = belief.sums_of(self._watch)
         everything, touched = changes.take()
         if everything or belief is not self._belief:
-            self._load(belief)
-            self._replan(pose, -1)
-            self._pose = pose
-            return
+            differing = self._differing(belief)
+            if differing is None:
+                self._load(belief)
+                self._replan(pose, -1)
+                self._pose = pose
+                return
+            self._belief, touched = belief, [differing]
         steps = self._steps_flown(cell)
         if steps > 0:
             flown = plans.advance(steps, *self._pose, chart, tree)
@@ -237,6 +240,18 @@ class SweepPlanner:
         if tree.mark[plans.NOW] > self.settings.horizon:
             self._shift()
 
+    def _differing(self, belief: Belief) -> NDArray[np.int64] | None:
+        """Where `belief` differs from what the chart was made from, cells [k, 2]; None if that is another map.
+
+        A caller may hand over a copy each time, with what it expects to see on the way to where it plans from.
+        """
+        if self._belief is None:
+            return None
+        flat = np.flatnonzero(belief.weights != self._known)
+        if flat.size > self._known.size // 4:
+            return None
+        return np.stack(np.divmod(flat, self._chart.cols), axis=1)
+
     def _replan(self, pose: tuple[int, int, int], pause: int) -> None:
         """Plan anew from here; see `plans.replan`."""
         self._unseen = 0.0
@@ -249,9 +264,10 @@ class SweepPlanner:
     def _load(self, belief: Belief) -> None:
         """Take over the whole belief."""
         self._belief = belief
-        self._evidence = Evidence(belief.weights)
+        self._known = belief.weights.copy()
         self._hits = belief.hits
-        self._chart.mass[:] = np.where(self._viewable, belief.weights, 0.0)
+        worth = belief.weights * self._share(belief, np.arange(self._known.size))
+        self._chart.mass[:] = np.where(self._viewable, worth, 0.0)
         charts.draw_up(self._chart)
         self._at_first = float(self._chart.mass.sum())
         self._tree.value[plans.UNDETECTED] = self._at_first
@@ -282,8 +298,8 @@ class SweepPlanner:
     def _correct(self, belief: Belief, cells: NDArray[np.int64]) -> bool:
         """Set the mass of cells to what the belief makes of them for the planner; whether any differed."""
         flat = cells[:, 0] * self._chart.cols + cells[:, 1]
-        self._evidence.note(flat, belief.weights[flat])
-        worth = belief.weights[flat] * self._evidence.discount(flat, self.settings.contradicted)
+        self._known[flat] = belief.weights[flat]
+        worth = belief.weights[flat] * self._share(belief, flat)
         actual = np.where(self._viewable[flat], worth, 0.0)
         expected = self._chart.mass[flat]
         wrong = np.flatnonzero(np.abs(actual - expected) > 1e-12 * np.maximum(actual, expected))
@@ -295,6 +311,16 @@ class SweepPlanner:
         )  # flown over and not reported, or reported late
         self._unseen += float((actual - expected)[looks].sum())
         return bool(wrong.size)
+
+    def _share(self, belief: Belief, cells: NDArray[np.int64]) -> NDArray[np.float64]:
+        """What part of the weights of `cells` [k] counts; see `SweepSettings.contradicted`.
+
+        A false alarm and the miss at the next look leave a cell about where it was before both, and it is as
+        much worth a look as its neighbours. But they lie in the drone's way, while coming back for a single cell
+        takes two steps or more. A cell whose hits outweigh its misses counts whole.
+        """
+        share: NDArray[np.float64] = np.power(self.settings.contradicted, belief.contradicted(cells))
+        return share
 
     def _shift(self) -> None:
         """Forget the flown part of the plan."""

@@ -176,6 +176,35 @@ def test_a_deadline_stops_an_endless_search() -> None:
         planner.plan(belief, state, rng)
 
 
+def test_copies_of_a_belief_are_planned_for_as_the_belief_itself() -> None:
+    """A caller hands over a copy with what it expects to see; the plan and the thinking go on."""
+    flights = []
+    for copies in (False, True):
+        belief, rng = Belief(hill((60, 60), (30, 34), 8.0)), np.random.default_rng(0)
+        planner, noise = SweepPlanner(QUICK, fov=FOVS["point"]), np.random.default_rng(1)
+        state, path = SearchState((30, 20)), []
+        for _ in range(120):
+            thought = belief.copy() if copies else belief
+            state = after(state, planner.plan(thought, state, rng).path[0])
+            path.append(state.cell)
+            belief.observe([state.cell], bool(noise.random() < 0.1), 0.9, 0.9)
+        flights.append(path)
+    assert flights[0] == flights[1]
+
+
+def test_what_was_only_expected_is_taken_back_when_another_copy_does_not_expect_it() -> None:
+    belief, rng = Belief(hill((40, 40), (20, 20), 5.0)), np.random.default_rng(0)
+    planner = SweepPlanner(QUICK, fov=FOVS["point"])
+    planner.plan(belief.copy(), SearchState((20, 12)), rng)
+    thought = belief.copy()
+    thought.observe([(20, 20), (20, 21)], False, 0.9, 0.9)
+    planner.plan(thought, SearchState((20, 12)), rng)
+    planner.plan(belief.copy(), SearchState((20, 12)), rng)
+    assert planner._chart.mass.reshape(40, 40)[20, 20:22] == pytest.approx(
+        belief.weights.reshape(40, 40)[20, 20:22]
+    )
+
+
 def test_another_belief_or_place_is_planned_anew() -> None:
     rng = np.random.default_rng(0)
     planner = SweepPlanner(QUICK, fov=FOVS["point"])

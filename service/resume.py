@@ -12,7 +12,7 @@ from service.errors import BadInput
 from service.evidence.intake import Intake
 from service.evidence.observe import Observation
 from service.evidence.verdict import ROW as VERDICT
-from service.journal import Row, read_meta, read_rows
+from service.journal import Row, read_last, read_meta, read_rows
 from service.search import Search
 from service.survey import AREA, JOURNAL, PRIOR, survey
 
@@ -37,6 +37,12 @@ def stored_run(folder: Path) -> tuple[Settings, SearchArea, Grid, list[Row]]:
     if not rows:
         raise BadInput(f"{folder}: its journal is empty; nothing has happened yet that could be shown")
     return settings, area, grid, rows
+
+
+def last_transition(journal: Path) -> dict[str, str] | None:
+    """The last change of state in a journal (`from`, `event`, `to`, `reason`), or None before the first."""
+    rows = read_last(journal, "transition", 1)
+    return rows[0].body if rows else None
 
 
 def retrace(row: Row, search: Search) -> None:

@@ -32,10 +32,10 @@ from service.http import Door, open_door
 from service.journal import Journal
 from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
 from service.mission.mission import Mission
-from service.mission.states import FINAL
+from service.mission.states import FINAL, State
 from service.progress import set_up_logging, show
 from service.report import run_report, simulated, write_results
-from service.resume import replay, stored_settings
+from service.resume import last_transition, replay, stored_settings
 from service.search import Search
 from service.survey import AREA, JOURNAL, PRIOR, survey
 from service.view.live import RunView
@@ -258,6 +258,8 @@ class Service:
             log.info(
                 "resumed: %d reports of the earlier run, POS %.1f %%", replayed, 100 * self.search.record.pos
             )
+        if (last := last_transition(journal.path)) is not None and last["to"] == State.RETURNING:
+            mission.was_returning = last
         self.view.mission, self.view.intake = mission, intake
         return mission
 
@@ -296,8 +298,12 @@ class Service:
                 log.warning("%s again: leaving the aircraft to its autopilot", name)
                 flying.cancel()
             else:
-                log.warning("%s: returning (once more to leave the aircraft to its autopilot)", name)
-                orders.add(asyncio.create_task(mission.order("return" if mission.flight.began else "abort")))
+                ours = (
+                    mission.flight.began and mission.state != State.YIELDED
+                )  # a pilot's aircraft is not taken
+                order = "return" if ours else "abort"
+                log.warning("%s: %s (once more to leave the aircraft to its autopilot)", name, order)
+                orders.add(asyncio.create_task(mission.order(order)))
 
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, stop, number.name)

@@ -2,7 +2,7 @@
 
 from service.area.frame import GridFrame
 from service.area.geotiff import read_geotiff_prior
-from service.area.grid import Grid, build_grid, leg_is_clear, nearest_flyable, way_home
+from service.area.grid import Grid, build_grid, leads_out, leg_is_clear, nearest_flyable, way_home
 from service.area.model import Exclusion, LatLon, PointPrior, PolygonPrior, SearchArea
 from service.area.reading import parse_area, read_area
 
@@ -15,6 +15,7 @@ __all__ = [
     "PolygonPrior",
     "SearchArea",
     "build_grid",
+    "leads_out",
     "leg_is_clear",
     "nearest_flyable",
     "parse_area",

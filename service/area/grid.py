@@ -174,6 +174,11 @@ def leg_is_clear(grid: Grid, start: LatLon, end: LatLon) -> bool:
     return route.leg_is_clear(grid.frame, grid.keep_out, start, end)
 
 
+def leads_out(grid: Grid, start: LatLon, end: LatLon) -> bool:
+    """Whether the straight leg leaves the exclusion that it begins in or near, by about the nearest way."""
+    return route.leads_out(grid.frame, grid.keep_out, start, end)
+
+
 def way_home(grid: Grid, start: LatLon, end: LatLon) -> list[LatLon]:
     """The shortest route between two (latitude, longitude) around the exclusions; see `route.way`.
 

@@ -21,6 +21,9 @@ from service.errors import BadInput
 _SPARE_M = 0.5
 """Leaving the zone by the nearest way ends this far outside it."""
 
+_ABOUT = 1.5
+"""So much longer than the nearest way out a leg out of the zone may be: the aircraft drifts while it is sent."""
+
 _TOLERANCES_M = (0.5, 1.0, 2.0, 4.0, 8.0)
 _MAX_CORNERS = 250
 """The outline of exclusions is simplified by these tolerances in turn until it has this many corners."""
@@ -111,6 +114,16 @@ def leg_is_clear(frame: GridFrame, blocked: KeepOut, start: LatLon, end: LatLon)
     """Whether the straight leg between two positions stays outside every exclusion and its clearance."""
     points = frame.to_metres([start, end])
     return bool(blocked.clear(points[0], points[1:])[0])
+
+
+def leads_out(frame: GridFrame, blocked: KeepOut, start: LatLon, end: LatLon) -> bool:
+    """Whether a straight leg leaves the zone that it begins in by about the nearest way, and stays outside."""
+    points = frame.to_metres([start, end])
+    inside = shapely.intersection(blocked.zone, shapely.LineString(points))
+    begins, ends = shapely.intersects_xy(blocked.zone, points[:, 0], points[:, 1])
+    nearest = shapely.distance(shapely.Point(points[0]), shapely.boundary(blocked.shell))
+    about = inside.length <= _ABOUT * nearest + _SPARE_M
+    return bool(begins and not ends and inside.geom_type == "LineString" and about)
 
 
 def way(frame: GridFrame, blocked: KeepOut, start: LatLon, end: LatLon) -> list[LatLon]:

@@ -233,10 +233,10 @@ class Vehicle:
         self._core.take_control(self._clock.now())
 
     async def arm(self) -> None:
-        """On an operator's order, on the ground: enter the guided mode, take control and arm.
+        """On the ground, in our control (`enter_guided`): arm.
 
         Raises:
-            NotPermitted: arming is not allowed to this process, or the vehicle is not ready.
+            NotPermitted: arming is not allowed to this process, or the vehicle is not ready, or not in our control.
             CommandFailed: it does not arm.
         """
         self._pump()
@@ -247,7 +247,7 @@ class Vehicle:
         if not self.telemetry.ready_to_arm:
             raise NotPermitted("the vehicle was not armed: it is not ready")
         if not self.in_control:
-            await self.enter_guided()
+            raise NotPermitted(f"the vehicle was not armed: {self.telemetry.control_reason}")
         autopilot, since = self._need_autopilot(), self._clock.now()
         outcome = await self._ask(autopilot.arm())
         if not await self.wait_until(lambda t: t.armed, self._patience(3.0)):

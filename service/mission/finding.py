@@ -68,7 +68,8 @@ class Finding:
         elif mission.found is not None and mission.search.found() is None:
             mission.found = None
             homeward = mission.state == State.RETURNING and not mission.why_stopped
-            if homeward and not (mission.vehicle.in_control and mission.vehicle.telemetry.guided):
+            ours = mission.vehicle.in_control and mission.vehicle.telemetry.guided
+            if homeward and (mission.autopilot_returns or not ours):
                 await mission.vehicle.enter_guided()
             if homeward or mission.state == State.FOUND:
                 await mission.happen(Event.REJECTED, said)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from service.area import Grid, leg_is_clear, way_home
+from service.area import Grid, leads_out, leg_is_clear, way_home
 from service.clock import Clock
 from service.config import Settings
 from service.errors import BadInput
@@ -157,12 +157,11 @@ class Helm:
     def _leg_allowed(self, point: LatLon) -> bool:
         """Clear of every exclusion, or the straight way out of the one the aircraft has drifted into."""
         here = self.here()
-        if leg_is_clear(self.grid, here, point):
-            return True
-        try:
-            return self.distance(way_home(self.grid, here, point)[0], point) < 1.0
-        except BadInput:  # there is no way at all
-            return False
+        return leg_is_clear(self.grid, here, point) or leads_out(self.grid, here, point)
+
+    def too_near(self) -> bool:
+        """Over an exclusion, or within its clearance, where no leg of the search may begin."""
+        return bool(shapely.intersects_xy(self.grid.keep_out.zone, *self._metres(self.here())))
 
     def trouble(self, *, moving: bool) -> NotSent | None:
         """What stands against flying on while the autopilot follows our waypoints, or nothing."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from service.mission.helm import LEAST_PATIENCE_WALL_S
 from service.mission.limits import hold_objection
-from service.mission.states import Event, State
+from service.mission.states import FLYING, Event, State
 
 if TYPE_CHECKING:
     from service.mission.mission import Mission
@@ -32,6 +32,7 @@ class Holds:
     def entered(self, state: State, now: float) -> None:
         """The mission is in another state."""
         self.homeward = state == State.RETURNING or (self.homeward and state == State.HOLDING)
+        self.direct = self.direct and state not in FLYING
         if state == State.HOLDING:
             self._since = now
         else:  # a cause that outlives its hold would keep the next one from ending
@@ -47,6 +48,9 @@ class Holds:
         """Hover until the cause is gone, an operator decides, or it is time to fly home."""
         mission = self._mission
         while mission.state == State.HOLDING:
+            if mission.resend:  # the stop may have been lost
+                mission.resend = False
+                await mission.helm.hover(wanted=lambda: mission.state == State.HOLDING)
             if "detector" in self.causes and not self.detector_silent():
                 await self.release("detector", "the detector reports again")
             elif "link" in self.causes and mission.helm.heard():

@@ -55,8 +55,9 @@ def wind_objection(t: Telemetry, flight: FlightSettings) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A position with the vehicle's own time since boot (seconds); degrees and m/s."""
+    """A position; when it was told by the service's clock, and the vehicle's time since boot: seconds; degrees, m/s."""
 
+    told: float
     boot_s: float
     lat: float
     lon: float
@@ -68,7 +69,7 @@ class Sample:
         """The sample in a snapshot, if the vehicle has told one."""
         if t.boot_time_s is None or not t.position_known:
             return None
-        return cls(t.boot_time_s, t.lat, t.lon, t.velocity_ned_mps[0], t.velocity_ned_mps[1])
+        return cls(t.position_time, t.boot_time_s, t.lat, t.lon, t.velocity_ned_mps[0], t.velocity_ned_mps[1])
 
 
 def jump_m(before: Sample, after: Sample) -> float:
@@ -121,6 +122,8 @@ class PositionTrust:
 
     def _jumped(self, t: Telemetry) -> list[str]:
         before, after = self._last, Sample.of(t)
+        if before is not None and after is not None and before.told == after.told:
+            return []  # other messages have told the time since boot, but no new position has come
         self._last = after
         if before is None or after is None or after.boot_s <= before.boot_s:
             return []

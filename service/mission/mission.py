@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import logging
+import math
 import sqlite3
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
 
 from roisearch import Decision
 from service.clock import Clock
@@ -38,6 +40,7 @@ log = logging.getLogger("roisearch")
 TICK_S = 0.1
 RETRY_S = 1.0
 LEAVING_S = 5.0
+HOME_AGAIN_S = 5.0  # after which a return to launch that is not flown is ordered again
 _CRITICAL = 2  # MAV_SEVERITY
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 
@@ -72,7 +75,10 @@ class Mission:
         self.why_here = ""  # the reason of the last transition
         self.why_stopped = ""
         self.searched = False  # the search ended because there was nothing more to gain, not by an order
-        self.resend = False  # the last waypoint may have been lost: `Watch` says so
+        self.resend = False  # the last waypoint or stop may have been lost: `Watch` says so
+        self.was_returning: Mapping[str, str] | None = None
+        """The last transition of the run that this one goes on with, when it was on its way home."""
+        self.autopilot_returns = False  # the return to launch was ordered: it flies by itself now, or soon
         self._hovering = False  # over a suspect, for another look
         fly = settings.flight
         self._navigator = Navigator(self.frame.cell_m, fly.speed_mps, fly.deceleration_mps2, fly.corner_m)
@@ -97,6 +103,9 @@ class Mission:
             return False
         self.state, self.why_here = after, reason
         self.holds.entered(after, self.clock.now())
+        self.autopilot_returns = False
+        if after in FLYING and before not in FLYING:
+            self.why_stopped, self.searched = "", False
         if not (before in FLYING and after in FLYING):
             self.helm.rest()
         if after == State.YIELDED:
@@ -118,6 +127,7 @@ class Mission:
             refusal = await self.helm.hover(wanted=lambda: self.state == State.HOLDING)
             if refusal is not None:
                 log.warning("no hold was sent: %s", refusal.reason)
+                self.resend = refusal.cause == "link"
 
     async def leave(self, reason: str, *, stop: bool = True) -> None:
         """End the run where it is, for a fault that it cannot go on with or on a signal.
@@ -153,7 +163,7 @@ class Mission:
         return self.state.value
 
     async def _obey(self, command: str) -> None:
-        ours = self.vehicle.in_control and self.vehicle.telemetry.guided
+        ours = self.vehicle.in_control and self.vehicle.telemetry.guided and not self.autopilot_returns
         if command == "hold":
             if self.state == State.RETURNING and not ours:  # the autopilot flies home by itself
                 await self.vehicle.enter_guided()
@@ -163,10 +173,10 @@ class Mission:
                 await self.vehicle.enter_guided()
             await self.happen(Event.RESUME, "the operator asked")
         elif command == "return":
-            self.why_stopped = self.why_stopped or "the operator asked to return"
             if self.state == State.YIELDED:
                 await self.vehicle.enter_guided()
-            await self.happen(Event.RETURN, "the operator asked")
+            if await self.happen(Event.RETURN, "the operator asked"):
+                self.why_stopped = self.why_stopped or "the operator asked to return"
         elif command == "abort":
             self.why_stopped = "the operator aborted the run"
             await self.happen(Event.ABORT, "the operator asked")
@@ -209,32 +219,71 @@ class Mission:
         await self.vehicle.wait_until(lambda t: t.landed_state != "undefined", patience)
         self.helm.begin()
         await self.happen(Event.LINKED, f"{self.vehicle.telemetry.autopilot} is ready")
-        if self.may_take_off and self.helm.on_ground():
+        if self.state != State.READY:  # aborted meanwhile
+            return
+        if self.was_returning is not None:
+            await self._go_on_home(self.was_returning)
+        elif self.may_take_off and self.helm.on_ground():
             await self._take_off()
         else:
             log.info("take off and select the guided mode: the search starts when the aircraft hovers in it")
-            while self.state == State.READY and not self.helm.hovering():
-                await self.clock.sleep(TICK_S)
-            if self.state == State.READY:
-                await self.vehicle.enter_guided()
+            if await self._hovers():
                 await self.happen(Event.AIRBORNE, "in the air, in the guided mode")
+
+    async def _go_on_home(self, last: Mapping[str, str]) -> None:
+        """The run that this one goes on with was on its way home. So is this one, if the aircraft is ours still, or
+        down; while the autopilot brings it home, or a pilot has it, that is waited for."""
+        log.info("it was on its way home: waiting until the aircraft is down, or hovers in the guided mode")
+        self.found = self.search.found()
+        self.why_stopped = "" if self.found else last["reason"]
+        self.searched = last["event"] in (Event.SEARCHED, Event.ENERGY_LOW)
+        while self.state == State.READY and not self.helm.on_ground() and not self.helm.hovering():
+            await self.clock.sleep(TICK_S)
+        if self.state == State.READY and (self.helm.on_ground() or await self._hovers()):
+            await self.happen(Event.RETURN, "it was on its way home")
+
+    async def _hovers(self) -> bool:
+        """Wait until the aircraft hovers in the guided mode, and take control; False when the state changed first."""
+        while self.state == State.READY and not self.helm.hovering():
+            await self.clock.sleep(TICK_S)
+        if self.state == State.READY:
+            await self.vehicle.enter_guided()
+            self.helm.begin()  # home is where it was armed
+        return self.state == State.READY
 
     async def _take_off(self) -> None:
         height = self.settings.flight.altitude_m
-        await self.vehicle.wait_ready(self.settings.link.connect_timeout_s)
-        await self.happen(Event.CLIMB, f"taking off to {height:.0f} m")
+        await self._unless_changed(self.vehicle.wait_ready(self.settings.link.connect_timeout_s))
+        if not await self.happen(Event.CLIMB, f"taking off to {height:.0f} m"):
+            return
         await self._write("command", {"command": "take off", "height_m": height})
         self.flight.began = self.clock.now()
+        vehicle = self.vehicle
         try:
-            await self.vehicle.enter_guided()
-            await self.vehicle.arm()
-            await self.vehicle.take_off(height)
+            for step in (vehicle.enter_guided, vehicle.arm, functools.partial(vehicle.take_off, height)):
+                if self.state != State.TAKEOFF or not await self._unless_changed(step()):
+                    return
+            self.helm.begin()  # home is where it was armed
             await self.happen(Event.AIRBORNE, f"at {height:.0f} m")
         except LinkError as error:
             await self.clock.sleep(RETRY_S)  # what the pilot did is told by an event of its own
             if self.state == State.TAKEOFF:
                 raise
             log.warning("%s", error)
+
+    async def _unless_changed(self, action: Coroutine[object, object, object]) -> bool:
+        """Carry out what takes long, as long as the state lasts; False when that changed, and it was broken off."""
+        state, doing = self.state, asyncio.create_task(action)
+        try:
+            while not doing.done() and self.state == state:
+                await asyncio.wait([doing], timeout=TICK_S / self.clock.speedup)
+            if doing.done():
+                doing.result()
+            return self.state == state
+        finally:
+            doing.cancel()
+            with contextlib.suppress(asyncio.CancelledError, LinkError):
+                await doing
 
     async def _phase(self) -> None:
         """Do what the state asks for until the state changes."""
@@ -254,10 +303,12 @@ class Mission:
         """Fly from decision to decision until something else is to be done."""
         if not self.flight.began:
             self.flight.began = self.clock.now()
-        await self._command(self.vehicle.set_speed(self.settings.flight.speed_mps), "speed")
+        await self._command(
+            "speed", functools.partial(self.vehicle.set_speed, self.settings.flight.speed_mps)
+        )
         here, inside = self.helm.cell()
         start = self.search.nearest_flyable(here)
-        if not inside or start != here:
+        if self.state in FLYING and (not inside or start != here or self.helm.too_near()):
             await self._fly_route(start)
         self.intake.last_at = self.clock.now()
         self._navigator.interrupt(start, self.helm.heading())
@@ -268,7 +319,7 @@ class Mission:
             await self._tick()
 
     async def _look_for_the_end(self) -> None:
-        """Found, searched enough, too little energy, or nobody looking?"""
+        """Found, searched enough, or nobody looking?"""
         settings, place = self.settings, self.search.place
         if await self.finding.look():
             return
@@ -283,9 +334,6 @@ class Mission:
         elif self.flight.steps >= settings.search.max_steps:
             self.why_stopped = f"{self.flight.steps} steps flown"
             await self._stop_searching(Event.SEARCHED)
-        elif why := self._energy_low():
-            self.why_stopped = why
-            await self._stop_searching(Event.ENERGY_LOW)
         elif self.holds.detector_silent():
             log.warning("no detector report for %.0f s: hovering", settings.sensor.silent_after_s)
             await self.hold("detector", "the detector is silent")
@@ -332,6 +380,8 @@ class Mission:
         if self.resend or (target is not None and not await self._send(self.helm.latlon(target))):
             await self.clock.sleep(RETRY_S)
             self.resend = False
+            self._drop_thought()  # it begins where the aircraft does not go now
+            here, _ = self.helm.cell()
             navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
         elif target is not None and self._hit_at is not None:
             self.flight.latencies_s.append(time.perf_counter() - self._hit_at)
@@ -360,10 +410,14 @@ class Mission:
                 if not await self._fly_to(point):
                     return
         self.helm.rest()  # from here the autopilot steers: it need not come nearer to a waypoint of ours
-        await self._command(self.vehicle.return_to_launch(), "return to launch")
+        ordered = -math.inf
         while self.state == State.RETURNING:
-            if not self.vehicle.telemetry.armed:
+            now, telemetry = self.clock.now(), self.vehicle.telemetry
+            if not telemetry.armed:
                 await self.happen(Event.LANDED, "on the ground, disarmed")
+            elif ordered < 0.0 or (telemetry.guided and now - ordered > HOME_AGAIN_S):
+                ordered, self.autopilot_returns = now, True
+                await self._command("return to launch", self.vehicle.return_to_launch)
             else:
                 await self.clock.sleep(TICK_S)
 
@@ -390,7 +444,8 @@ class Mission:
     # ---- beside the phases -------------------------------------------------------------------------------
 
     async def _guard(self) -> None:
-        """Ten times a second: can the position be trusted, is the waypoint flown, is there too much wind?"""
+        """Ten times a second: can the position be trusted, is the waypoint flown, is there the energy for the way home,
+        is there too much wind?"""
         while True:
             if self.journal.failed is not None:  # told to somebody else, who does not fly
                 raise self._journal_lost(self.journal.failed)
@@ -398,6 +453,9 @@ class Mission:
             trouble = self.helm.trouble(moving=self.state in MOVING)
             if trouble is not None and self.state in (*MOVING, State.HOLDING):
                 await self.hold(trouble.cause, trouble.reason)
+            if self.state in FLYING and (why := self._energy_low()):
+                self.why_stopped = why
+                await self._stop_searching(Event.ENERGY_LOW)
             if self.state in FLYING and (why := self.helm.too_windy() or self.helm.strayed()):
                 self.why_stopped = why
                 await self.happen(Event.RETURN, why)
@@ -423,11 +481,14 @@ class Mission:
             log.warning("waypoint not sent: %s", refusal.reason)
         return refusal is None
 
-    async def _command(self, action: Awaitable[object], name: str) -> None:
-        """Carry out a command that is not a waypoint; a refusal is told, not fatal."""
+    async def _command(self, name: str, action: Callable[[], Awaitable[object]]) -> None:
+        """Carry out a command that is not a waypoint, if the state outlasts its row; a refusal is told, not fatal."""
+        state = self.state
         await self._write("command", {"command": name})
+        if self.state != state:
+            return
         try:
-            await action
+            await action()
         except LinkError as error:
             log.warning("%s: %s", name, error)
 

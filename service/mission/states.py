@@ -57,6 +57,7 @@ TABLE: dict[tuple[State, Event], State] = {
     (State.WAITING, Event.LINKED): State.READY,
     (State.READY, Event.CLIMB): State.TAKEOFF,
     (State.READY, Event.AIRBORNE): State.SEARCHING,
+    (State.READY, Event.RETURN): State.RETURNING,
     (State.TAKEOFF, Event.AIRBORNE): State.SEARCHING,
     (State.TAKEOFF, Event.PILOT): State.YIELDED,
     (State.TAKEOFF, Event.RETURN): State.RETURNING,

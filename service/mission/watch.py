@@ -66,6 +66,7 @@ class Watch:
         self._refused += 1
         if mission.state not in MOVING:
             log.warning("the stop is not flown: %s", event.reason)
+            mission.resend = self._refused < REFUSALS
         elif not mission.helm.heard():
             await mission.hold("link", "the autopilot is silent")
         elif doubts := mission.helm.doubts():

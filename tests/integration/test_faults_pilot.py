@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from pathlib import Path
 
@@ -95,3 +96,16 @@ def test_a_reboot_in_flight_is_told_and_answered_by_nothing_that_moves(flavor: s
         assert scene.tap.motions[motions:] == []
     assert code == 4
     assert "rebooted" in report["stopped_because"] or "disarmed" in report["stopped_because"]
+
+
+def test_a_signal_does_not_take_the_aircraft_from_the_pilot(tmp_path: Path) -> None:
+    with flight(tmp_path, "ardupilot", speedup=5.0) as scene:
+        scene.searching()
+        scene.control.fault("pilot", mode="LOITER")
+        scene.reaches("YIELDED", "LOITER")
+        motions = len(scene.tap.motions)
+        scene.service.process.send_signal(signal.SIGTERM)
+        code, report = scene.ends()
+        assert scene.tap.motions[motions:] == []
+        assert scene.control.state()["mode"] == "LOITER"
+    assert (code, report["outcome"]) == (4, "aborted")

@@ -13,6 +13,7 @@ from service.area import build_grid, read_area
 from service.evidence.observe import Observation
 from service.journal import read_rows
 from tests.integration.flight import only_report, running, service_words, write_area
+from tests.integration.scene import TARGET, flight
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -51,6 +52,32 @@ def test_a_killed_search_goes_on_with_the_same_belief_to_the_last_bit(tmp_path: 
     assert only_report(tmp_path / "runs")["simulated"]["error_cells"] <= 1.5
     ids = [row.body["report"]["id"] for row in read_rows(folder / "journal.sqlite", "report")]
     assert len(ids) == len(set(ids)) > count
+
+
+def test_a_run_that_was_killed_on_its_way_home_ends_there_and_not_with_another_search(tmp_path: Path) -> None:
+    with flight(tmp_path, "ardupilot", target=TARGET) as scene:
+        scene.reaches("RETURNING", "found")
+        while scene.control.state()["mode"] != "RTL":
+            time.sleep(0.02)
+        scene.service.process.kill()
+        motions = len(scene.tap.motions)
+        (folder,) = scene.runs.iterdir()
+        again = [
+            "service",
+            "--resume",
+            str(folder),
+            "--http",
+            "127.0.0.1:0",
+            "--speedup",
+            f"{scene.speedup:g}",
+        ]
+        with running(*again) as service:
+            assert service.exit_code() == 0, service.said
+        assert scene.tap.motions[motions:] == []  # the autopilot was bringing it home
+        assert not scene.control.state()["armed"]
+    report = only_report(tmp_path / "runs")
+    assert report["outcome"] == "found"
+    assert report["position"]["lat"] == pytest.approx(47.0508, abs=3e-4)
 
 
 def test_resuming_what_is_no_run_is_one_clear_line(tmp_path: Path) -> None:

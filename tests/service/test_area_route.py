@@ -9,7 +9,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from service.area import Grid, LatLon, SearchArea, build_grid, leg_is_clear, way_home
+from service.area import Grid, LatLon, SearchArea, build_grid, leads_out, leg_is_clear, way_home
 from service.errors import BadInput
 from tests.service.area_files import at, box, collection, feature, parse, polygon, ring, square
 
@@ -92,6 +92,19 @@ def test_from_inside_an_exclusion_the_nearest_way_out_comes_first() -> None:
     exit_east = grid.frame.to_metres([route[0]])[0] - grid.frame.to_metres([place(0, 0)])[0]
     assert exit_east == pytest.approx([55.5, 0], abs=0.2)
     assert all(leg_is_clear(grid, a, b) for a, b in itertools.pairwise(route))
+
+
+def test_out_of_an_exclusion_only_about_the_nearest_way_is_allowed() -> None:
+    """The block reaches 50 m east of its middle, its clearance 5 m more."""
+    _, grid = field(BLOCK)
+    drifted = place(40, 2)  # since the way out was reckoned from (40, 0)
+    out = way_home(grid, place(40, 0), place(-150, 0))[0]
+    assert leads_out(grid, drifted, out)
+    assert leads_out(grid, place(53, 0), out)  # only too near, and not over it
+    assert not leads_out(grid, drifted, place(60, 150))  # a long way through it
+    assert not leads_out(grid, drifted, place(-150, 0))
+    assert not leads_out(grid, drifted, place(45, 0))  # not out
+    assert not leads_out(grid, place(60, 0), place(150, 0))  # was out
 
 
 def test_into_an_exclusion_the_route_goes_to_its_edge_first() -> None:

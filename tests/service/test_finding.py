@@ -43,6 +43,7 @@ class Scene:
             state=State.SEARCHING,
             found=None,
             why_stopped="",
+            autopilot_returns=False,
             vehicle=SimpleNamespace(in_control=True, telemetry=SimpleNamespace(guided=True)),
             happen=self.happen,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -20,11 +21,15 @@ class Stage:
     def __init__(self, after_silence: str = "resume") -> None:
         self.settings = Settings.model_validate({"link": {"after_silence": after_silence}})
         self.state, self.why_stopped, self.searched = State.SEARCHING, "", False
-        self.helm = SimpleNamespace(heard=lambda: self.hears, doubts=lambda: [])
+        self.resend, self.stops = False, 0
+        self.helm = SimpleNamespace(heard=lambda: self.hears, doubts=lambda: [], hover=self.hover)
         self.clock = SimpleNamespace(now=lambda: self.time, speedup=1.0)
         self.intake = SimpleNamespace(last_at=0.0)
         self.hears, self.time, self.low = True, 0.0, ""
         self.holds = Holds(cast(Mission, self), tick=self.tick, energy_low=lambda: self.low)
+
+    async def hover(self, wanted: Callable[[], bool]) -> None:
+        self.stops += wanted()
 
     async def tick(self) -> None:
         self.time += 1.0
@@ -60,6 +65,23 @@ def test_after_a_silence_it_may_have_to_wait_for_an_operator() -> None:
     with pytest.raises(TimeoutError):
         stage.hold("link")
     assert (stage.state, stage.holds.causes) == (State.HOLDING, {"operator"})
+
+
+def test_a_stop_that_may_have_been_lost_is_sent_again_once() -> None:
+    stage = Stage("hold")
+    stage.resend = True
+    with pytest.raises(TimeoutError):
+        stage.hold("link")
+    assert (stage.stops, stage.resend) == (1, False)
+
+
+def test_a_search_that_goes_on_may_fly_home_by_its_own_way_again() -> None:
+    stage: Any = Stage()
+    stage.holds.direct = True
+    asyncio.run(stage.happen(Event.HOLD, "the operator asked"))
+    assert stage.holds.direct
+    asyncio.run(stage.happen(Event.RESUME, "the operator asked"))
+    assert not stage.holds.direct
 
 
 def test_a_cause_does_not_outlive_its_hold() -> None:

@@ -95,6 +95,16 @@ def test_a_jump_is_told_from_a_flight_and_is_trusted_again_after_a_while() -> No
     assert trust.trusted_at(jumped + 9.0)
 
 
+def test_a_gap_in_the_radio_is_no_jump_when_another_message_ends_it() -> None:
+    """The attitude tells the time since boot before the first new position comes."""
+    trust = PositionTrust(FLIGHT, FRESH_S)
+    trust.update(GOOD, 100.0)
+    attitude = replace(GOOD, boot_time_s=51.5, heartbeat_time=101.5)
+    assert trust.update(attitude, 101.5) == []
+    assert trust.update(moved(GOOD, 1.55, 12.4), 101.55) == []
+    assert trust.update(moved(GOOD, 2.0, 80.0), 102.0) == ["the position jumped by 64 m"]
+
+
 def test_a_reboot_is_no_jump() -> None:
     trust = PositionTrust(FLIGHT, FRESH_S)
     trust.update(GOOD, 100.0)

@@ -109,6 +109,7 @@ async def up(vehicle: Vehicle, height_m: float = 20.0) -> None:
     """From power-on to the hover."""
     await vehicle.connect(60.0)
     await vehicle.wait_ready(120.0)
+    await vehicle.enter_guided()
     await vehicle.arm()
     await vehicle.take_off(height_m)
 
@@ -261,6 +262,19 @@ def test_without_permission_nothing_is_armed(mock: Mock) -> None:
         assert not await vehicle.wait_until(lambda t: t.armed, 5.0)
 
     flight(mock, fly, allow_arming=False)
+
+
+def test_an_aircraft_that_was_taken_from_us_is_not_armed(mock: Mock) -> None:
+    async def fly(vehicle: Vehicle, events: list[VehicleEvent]) -> None:
+        await vehicle.connect(60.0)
+        await vehicle.wait_ready(120.0)
+        await vehicle.enter_guided()
+        vehicle.release_control("the pilot has it")
+        with pytest.raises(NotPermitted, match="the pilot has it"):
+            await vehicle.arm()
+        assert not vehicle.in_control
+
+    flight(mock, fly)
 
 
 def test_arming_before_it_is_ready_is_refused_by_us(mock: Mock) -> None:

@@ -21,7 +21,8 @@ class Watched:
         self.state, self.why_stopped = state, ""
         self.journal = SimpleNamespace(failed=None, path="journal.sqlite")
         self.homeward = SimpleNamespace(update=lambda: self.did.append("energy"))
-        self.wind = self.strayed = ""
+        self.wind = self.strayed = self.low = ""
+        self._energy_low = lambda: self.low
         self.trouble: Any = None
         self.helm = SimpleNamespace(
             trouble=lambda moving: self.trouble,
@@ -39,6 +40,9 @@ class Watched:
 
     async def happen(self, event: Event, reason: str) -> None:
         self.did.append((event, reason))
+
+    async def _stop_searching(self, event: Event) -> None:
+        self.did.append((event, self.why_stopped))
 
     def looked_at_once(self) -> list[Any]:
         """What one round of the guard does."""
@@ -66,6 +70,14 @@ def test_a_doubtful_position_holds_what_moves_and_nothing_else(state: State) -> 
     moving = {State.SEARCHING, State.CONFIRMING, State.RETURNING, State.HOLDING}
     held = ("hold", "position", "the GPS has no 3D fix") in mission.looked_at_once()
     assert held == (state in moving)
+
+
+@pytest.mark.parametrize("state", list(State))
+def test_the_energy_for_the_way_home_is_asked_for_on_every_leg_of_a_search(state: State) -> None:
+    mission = Watched(state)
+    mission.low = "the way home needs 31 %"
+    searching = state in {State.SEARCHING, State.CONFIRMING}
+    assert ((Event.ENERGY_LOW, mission.low) in mission.looked_at_once()) == searching
 
 
 @pytest.mark.parametrize("why", ["a wind of 14 m/s", "the aircraft is outside the area"])

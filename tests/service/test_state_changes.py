@@ -18,6 +18,7 @@ class Changing:
     def __init__(self, state: State) -> None:
         self.did: list[Any] = []
         self.state, self.why_here = state, ""
+        self.why_stopped, self.searched, self.autopilot_returns = "the operator asked to return", True, True
         self.holds = SimpleNamespace(entered=lambda state, now: None)
         self.clock = SimpleNamespace(now=lambda: 0.0)
         self.helm = SimpleNamespace(rest=lambda: self.did.append("rest"))
@@ -37,9 +38,14 @@ class Changing:
 
 def change(state: State, event: Event) -> list[Any]:
     """What was done at this event."""
+    return changed(state, event).did
+
+
+def changed(state: State, event: Event) -> Changing:
+    """The mission after this event."""
     mission = Changing(state)
     asyncio.run(Mission.happen(cast(Mission, mission), event, "for a test"))
-    return mission.did
+    return mission
 
 
 @pytest.mark.parametrize(("state", "event", "after"), [(*key, after) for key, after in TABLE.items()])
@@ -58,6 +64,15 @@ def test_no_waypoint_outlives_the_state_that_wanted_it(state: State, event: Even
     assert ("rest" in did) == (not {state, after} <= flying)
     assert ("released" in did) == (after == State.YIELDED)
     assert "thought dropped" in did
+
+
+@pytest.mark.parametrize(("state", "event", "after"), [(*key, after) for key, after in TABLE.items()])
+def test_why_a_search_stopped_is_forgotten_when_it_goes_on(state: State, event: Event, after: State) -> None:
+    flying = {State.SEARCHING, State.CONFIRMING}
+    mission = changed(state, event)
+    goes_on = after in flying and state not in flying
+    assert (mission.why_stopped == "", mission.searched is False) == (goes_on, goes_on)
+    assert not mission.autopilot_returns
 
 
 def test_an_event_that_changes_nothing_does_nothing() -> None:

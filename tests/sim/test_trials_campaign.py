@@ -43,6 +43,8 @@ def test_what_is_given_overrides_the_papers_preset():
 
 def test_rulers_choose_between_searches_and_curves():
     assert (asked("--planners", "index", "--trials", "60").curves) == 0
+    asked_for = asked("--planners", "index", "--trials", "20", "--curves", "10")
+    assert (asked_for.trials, asked_for.curves) == (20, 10)
     both = asked("--planners", "index", "--trials", "60", "--ruler", "both")
     assert (both.trials, both.curves) == (60, 40)
     curve = asked("--planners", "index", "--ruler", "curve", "--curves", "7")

@@ -107,6 +107,15 @@ def test_a_curve_is_that_of_the_plain_ruler(fov):
     assert np.allclose(curve["curve"], plain[grid(campaign.cap)], atol=1e-9)
 
 
+@pytest.mark.parametrize("p_tn", [1.0, 0.7])
+def test_the_curve_of_a_perfect_detector_ends_when_nothing_is_left(p_tn):
+    prior, view = np.full((4, 5), 1 / 20), FieldOfView.point(1.0, p_tn)
+    planner, rng = make_planner("index", fov=view), np.random.default_rng(0)
+    curve = detection_curve(planner, prior, (0, 0), 1.0, 400, rng, p_tn, view)
+    assert curve[-1] == pytest.approx(1.0)
+    assert (np.diff(curve) >= 0.0).all()
+
+
 def test_searches_are_found_as_often_as_the_curve_says():
     campaign = replace(SMALL, planners=("coverage",), p_tn=1.0, trials=300, cap=200)
     (curve,) = run_job(replace(campaign, trials=0, curves=1), Job(CURVE, "coverage", "point", 0))

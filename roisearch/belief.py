@@ -291,7 +291,7 @@ def _flags(value: ArrayLike, k: int) -> NDArray[np.bool_]:
     """`value` as bool [k], or [1] for all looks alike."""
     if isinstance(value, bool):
         return _YES_NO[value]
-    array = np.array(value, dtype=np.bool_, order="C")
+    array = np.array(value, dtype=np.bool_, order="C", ndmin=1)
     if array.shape not in ((k,), (1,)):
         raise ValueError(f"hits must be one for each of the {k} cells, not of shape {array.shape}")
     return array
@@ -305,7 +305,7 @@ def _numbers(value: ArrayLike, k: int, name: str) -> NDArray[np.float64]:
                 _KNOWN.clear()
             _KNOWN[value] = np.array([value])
         return _KNOWN[value]
-    array = np.array(value, dtype=np.float64, order="C")
+    array = np.array(value, dtype=np.float64, order="C", ndmin=1)
     if array.shape not in ((k,), (1,)):
         raise ValueError(
             f"{name} must be one number or one for each of the {k} cells, not of shape {array.shape}"

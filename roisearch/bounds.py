@@ -68,11 +68,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch.bounds_kernels import greedy_looks, reference_looks, shortest_distances
+from roisearch.fov import HEADINGS, MOVES
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-HEADINGS = ("north", "east", "south", "west")
-MOVES = {"north": (-1, 0), "east": (0, 1), "south": (1, 0), "west": (0, -1)}
 MEMORY = 4  # footprints that `new_cells` looks back on
 
 
@@ -155,7 +154,7 @@ def new_cells(fov: Footprints, *, memory: int = MEMORY) -> int:
         at = np.zeros(2, dtype=np.int64)
         before: set[tuple[int, int]] = set()
         for step, heading in enumerate(headings):
-            at = at + MOVES[heading]
+            at = at + MOVES[HEADINGS.index(heading)]
             seen = {(int(row), int(col)) for row, col in offsets[heading] + at}
             if step == memory:
                 most = max(most, len(seen - before))
@@ -199,11 +198,6 @@ def quantiles(curve: Floats, levels: Iterable[float] = (0.05, 0.25, 0.5, 0.75, 0
     wanted = np.asarray(list(levels), dtype=np.float64)
     steps = np.searchsorted(np.asarray(curve), wanted - 1e-12).astype(np.float64)
     return np.where(steps >= len(curve), np.inf, steps)
-
-
-def above(curve: Floats, bound: Floats) -> float:
-    """How far above the bound a planner's expected time is: 0.12 means 12 %."""
-    return expected_time(curve) / expected_time(bound) - 1.0
 
 
 def _new_ground(mass: Floats, cells: Ints, looks: Ints, p_tp: float) -> Floats:

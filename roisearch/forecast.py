@@ -34,7 +34,7 @@ def expected_pos(
         belief: where the target may be; not changed.
         undetected: float [rows, cols], the prior mass that no look so far would have detected.
         planner: asked every `heed` steps; one of its own, for it may keep a plan.
-        until: the simulation ends when so much is gained.
+        until: the simulation ends when so much is gained, or when the target would be detected for sure.
     """
     thought, left = belief.copy(), undetected.copy()
     cell, heading = state.cell, state.heading
@@ -49,8 +49,10 @@ def expected_pos(
             rows, cols = seen[:, 0], seen[:, 1]
             gain = left[rows, cols] * p_tp
             left[rows, cols] -= gain
-            thought.observe(seen, misses, p_tp, p_tn)
             gained.append(gained[-1] + float(gain.sum()))
+            if p_tp == 1.0 and _nowhere_else(thought, seen):  # which no miss could explain
+                return np.array(gained[: steps + 1])
+            thought.observe(seen, misses, p_tp, p_tn)
     return np.array(gained[: steps + 1])
 
 
@@ -58,6 +60,12 @@ def steps_until(gained: NDArray[np.float64], wanted: float) -> int | None:
     """The first step at which `gained` (float [n + 1]) reaches `wanted`; None when it does not."""
     step = int(np.searchsorted(gained, wanted))
     return step if step < len(gained) else None
+
+
+def _nowhere_else(belief: Belief, cells: NDArray[np.int64]) -> bool:
+    """Whether the target can only be in one of `cells`."""
+    there = np.count_nonzero(belief.mass_at(cells))
+    return belief.outside == 0.0 and there == np.count_nonzero(belief.weights)
 
 
 def _heading(here: tuple[int, int], there: tuple[int, int]) -> str:

@@ -3,9 +3,9 @@
 Every variant flies the same held-out priors from the paper's start, planning at every step; only a path
 that was given without thinking is flown to its end before the next plan, when no false alarm can end it.
 E[T] is restricted to the cap of 40 000 steps and set against what the prior allows: the release bound with
-a point field of view, the multi-cell bound with another one. With false alarms it is set against the
-teleporting reference (`roisearch.bounds`), and both sides are averaged over the same number of draws,
-seeded alike. The results are kept in the folder: the same command goes on where it stopped.
+a point field of view, the multi-cell bound with another one. With a point field of view and false alarms
+it is set against the teleporting reference (`roisearch.bounds`). Both sides are averaged over the same
+number of draws, seeded alike. The results are kept in the folder: the same command goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import csv
 import dataclasses
+import itertools
 import json
 import shlex
 import sys
@@ -35,9 +36,11 @@ P_TP = 0.9
 VARIANTS = "iterations=0 iterations=1,horizon=3000 iterations=8,horizon=5000"
 SHARES = (50.0, 95.0, 99.9, 100.0)
 """Percentiles of the time that a decision takes; the last is the slowest."""
-FIELDS = ("variant", "fov", "p_tn", "equal", "deadline_ms", "seed", "draw", "expected", "reference", "steps",
-          "first_cpu_ms", "first_wall_ms",
+KEY = ("variant", "fov", "p_tn", "equal", "deadline_ms", "stop_below", "seed", "draw")
+"""The fields that tell one result from another."""
+FIELDS = (*KEY, "expected", "reference", "steps", "first_cpu_ms", "first_wall_ms",
           *(f"cpu_ms_{p:g}" for p in SHARES), *(f"wall_ms_{p:g}" for p in SHARES))  # fmt: skip
+COLOURS = ("#b0b0b0", "#d08c3a", "#1f6f8b", "#7a3b8f", "#3b8f4a")
 Row = dict[str, str]
 
 
@@ -92,13 +95,19 @@ def field_of_view(name: str, p_tn: float) -> FieldOfView:
 
 
 def reference_time(prior: NDArray[np.float64], fov: FieldOfView, p_tn: float, seed: tuple[int, int]) -> float:
-    """E[T] of what the result is set against; see the module's text."""
+    """E[T] of what the result is set against, which `reference_named` says; see the module's text."""
     if not fov.is_point:
         return expected_time(multi_cell(prior, PAPER_START, fov, P_TP, PAPER_STEPS))
     if p_tn == 1.0:
         return expected_time(release(prior, PAPER_START, P_TP, PAPER_STEPS))
     rng = np.random.default_rng(seed)
     return expected_time(teleport_reference(prior, P_TP, p_tn, PAPER_STEPS, rng, draws=1))
+
+
+def reference_named(options: argparse.Namespace) -> str:
+    """What `reference_time` is the time of."""
+    point = field_of_view(options.fov, options.p_tn).is_point
+    return "the teleporting reference" if point and options.p_tn < 1.0 else "the bound"
 
 
 def fly(variant: str, seed: int, draw: int, options: argparse.Namespace) -> Row:
@@ -120,9 +129,9 @@ def fly(variant: str, seed: int, draw: int, options: argparse.Namespace) -> Row:
 
 
 def key_of(variant: str, seed: int, draw: int, options: argparse.Namespace) -> tuple[str, ...]:
-    """What tells one result from another: the first seven fields."""
-    return (variant, options.fov, f"{options.p_tn:g}", options.equal, f"{options.deadline_ms or 0:g}", str(seed),
-            str(draw))  # fmt: skip
+    """The values of `KEY`."""
+    return (variant, options.fov, f"{options.p_tn:g}", options.equal, f"{options.deadline_ms or 0:g}",
+            f"{options.stop_below:g}", str(seed), str(draw))  # fmt: skip
 
 
 def averaged(rows: list[Row]) -> NDArray[np.float64]:
@@ -164,11 +173,10 @@ def summary_of(rows: list[Row]) -> dict[str, Any]:
 
 def report(rows: list[Row], options: argparse.Namespace, command: str) -> str:
     """The results as Markdown."""
-    what = "the teleporting reference" if options.p_tn < 1.0 else "the bound"
     lines = [
         f"{options.fov} field of view, p_tp = {P_TP:g}, p_tn = {options.p_tn:g}, start {PAPER_START}, at most "
         f"{PAPER_STEPS} steps; one standard error after ±.", "", f"    {command}", "",
-        f"| planner | priors | E[T] | of {what} | above it: ratio of sums | mean of ratios "
+        f"| planner | priors | E[T] | of {reference_named(options)} | above it: ratio of sums | mean of ratios "
         "| decision, processor ms: 50, 95, 99.9 %, most | by the clock | the first |",
         "|---" * 9 + "|",
     ]  # fmt: skip
@@ -187,8 +195,8 @@ def report(rows: list[Row], options: argparse.Namespace, command: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def plot(rows: list[Row], variants: list[str], path: Path) -> None:
-    """Each prior's E[T] above the reference, the priors in the order of the first variant's."""
+def plot(rows: list[Row], variants: list[str], reference: str, path: Path) -> None:
+    """Each prior's E[T] above its reference, so named; the priors in the order of the first variant's."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -196,9 +204,8 @@ def plot(rows: list[Row], variants: list[str], path: Path) -> None:
 
     figure, panel = plt.subplots(figsize=(9, 4), layout="constrained")
     order: dict[int, int] = {}
-    for variant, colour in zip(
-        variants, ("#b0b0b0", "#d08c3a", "#1f6f8b", "#7a3b8f", "#3b8f4a"), strict=False
-    ):
+    styles = itertools.cycle(itertools.product("os^D", COLOURS))
+    for variant, (marker, colour) in zip(variants, styles, strict=False):
         own = [row for row in rows if row["variant"] == variant]
         seeds = sorted({int(row["seed"]) for row in own})
         times = averaged(own)
@@ -207,9 +214,11 @@ def plot(rows: list[Row], variants: list[str], path: Path) -> None:
             order = {seed: place for place, seed in enumerate(np.array(seeds)[np.argsort(percent)].tolist())}
         places = [order[seed] for seed in seeds if seed in order]
         values = [value for seed, value in zip(seeds, percent, strict=True) if seed in order]
-        panel.plot(places, values, "o", ms=4, color=colour, label=f"{variant}: mean {np.mean(percent):.1f} %")
+        panel.plot(
+            places, values, marker, ms=4, color=colour, label=f"{variant}: mean {np.mean(percent):.1f} %"
+        )
     panel.set_xlabel("prior, in the order of the first planner")
-    panel.set_ylabel("E[T] above the bound, %")
+    panel.set_ylabel(f"E[T] above {reference}, %")
     panel.grid(alpha=0.3)
     panel.legend(frameon=False)
     figure.savefig(path, dpi=120)
@@ -248,7 +257,14 @@ def main(arguments: list[str]) -> int:
     kept: dict[tuple[str, ...], Row] = {}
     if results.exists():
         with results.open(newline="", encoding="utf-8") as file:
-            kept = {tuple(row[name] for name in FIELDS[:7]): row for row in csv.DictReader(file)}
+            reader = csv.DictReader(file)
+            if tuple(reader.fieldnames or ()) != FIELDS:
+                print(
+                    f"roisearch-sim ablation: {results} has other columns; give another --out",
+                    file=sys.stderr,
+                )
+                return 2
+            kept = {tuple(row[name] for name in KEY): row for row in reader}
     else:
         results.write_text(",".join(FIELDS) + "\n", encoding="utf-8")
     rows: list[Row] = []
@@ -267,7 +283,7 @@ def main(arguments: list[str]) -> int:
     (options.out / "ablation.md").write_text(text, encoding="utf-8")
     summary = {v: summary_of([row for row in rows if row["variant"] == v]) for v in variants}
     (options.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    plot(rows, variants, options.out / "above-bound.png")
+    plot(rows, variants, reference_named(options), options.out / "above-bound.png")
     print(text)
     return 0
 

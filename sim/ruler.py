@@ -60,11 +60,12 @@ def detection_curve(
         found += p_tp * float(undetected[rows, cols].sum())
         undetected[rows, cols] *= 1.0 - p_tp
         curve[step] = found
-        if len(seen):
-            belief.observe(seen, rng.random(len(seen)) >= p_tn, p_tp, p_tn)
-        if 1.0 - found < stop_below:
+        # A perfect detector leaves nothing in the end, and no belief could explain one more miss.
+        if 1.0 - found < stop_below or (p_tp == 1.0 and not undetected.any()):
             curve[step:] = found
             break
+        if len(seen):
+            belief.observe(seen, rng.random(len(seen)) >= p_tn, p_tp, p_tn)
     return np.minimum(curve, 1.0)
 
 

@@ -103,7 +103,9 @@ class Campaign:
         if not 0.0 < self.p_tp <= 1.0 or not 0.0 < self.p_tn <= 1.0:
             raise ValueError("p_tp and p_tn must be above 0 and at most 1")
         rows, cols = self.shape
-        if rows < 2 or cols < 2 or not (0 <= self.start[0] < rows and 0 <= self.start[1] < cols):
+        if rows < 2 or cols < 2:
+            raise ValueError(f"the map must have at least 2 rows and 2 columns, not {rows} x {cols}")
+        if not (0 <= self.start[0] < rows and 0 <= self.start[1] < cols):
             raise ValueError(f"the start {self.start} is not on the map of {rows} x {cols} cells")
         for planner in self.planners:
             self.planner(planner, self.fovs[0], None)

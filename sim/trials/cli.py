@@ -66,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--ruler",
         choices=("sampled", "curve", "both"),
-        help="drawn targets, exact curves, or both (default sampled)",
+        help="drawn targets, exact curves, or both (default sampled; with --curves or --preset paper both)",
     )
     p.add_argument("--seed", type=int, default=1, metavar="S", help="same seed, same numbers (default 1)")
     p.add_argument("--preset", choices=("default", "paper", "reference"), default="default",
@@ -119,7 +119,7 @@ def campaign_from(options: argparse.Namespace) -> Campaign:
     fovs = options.fov.split(",") if options.fov else FOVS if paper else ("point",)
     first_fov_only = () if options.planners or options.fov or not paper else PAPER_POINT_ONLY
     trials = options.trials if options.trials is not None else PAPER_TRIALS if paper else 100
-    ruler = options.ruler or ("both" if paper else "sampled")
+    ruler = options.ruler or ("both" if paper or options.curves else "sampled")
     curves = (
         options.curves if options.curves is not None else min(trials, _PAPER_CURVES if paper else _CURVES)
     )

@@ -78,7 +78,7 @@ def _draw_target(campaign: Campaign, job: Job, scenario: Scenario) -> int:
 
 def _search(scenario: Scenario, run: _Run, target: int) -> dict[str, Any]:
     prior = scenario.prior
-    regions = segment_regions(prior)
+    regions = segment_regions(prior, searchable=prior > 0.0)
     return {
         "found": run.found,
         "steps": run.search.steps,

@@ -70,6 +70,15 @@ def test_one_observation_of_many_cells_equals_many_of_one() -> None:
     assert together.digest() == apart.digest()
 
 
+@pytest.mark.parametrize("hit", [True, np.True_, np.array(True), 1, [True]])
+@pytest.mark.parametrize("p_tp", [1, 1.0, np.float32(1.0), np.array(1.0), [1.0]])
+def test_one_value_for_all_looks_may_be_any_number(hit: object, p_tp: object) -> None:
+    one, plain = Belief(PRIOR), Belief(PRIOR)
+    one.observe([(0, 0), (1, 2)], hit, p_tp, np.float64(0.75))
+    plain.observe([(0, 0), (1, 2)], [True, True], [1.0, 1.0], [0.75, 0.75])
+    assert one.digest() == plain.digest()
+
+
 def test_ten_thousand_misses_do_not_lose_the_total() -> None:
     belief = Belief(np.ones((20, 20)))
     for step in range(10_000):

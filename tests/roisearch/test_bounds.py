@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roisearch import bounds
+from roisearch.fov import HEADINGS, MOVES
 from sim.scenario import paper_prior
-
-MOVES = ((-1, 0), (0, 1), (1, 0), (0, -1))
 
 
 class Mask:
@@ -23,7 +22,7 @@ class Mask:
 
     def cells(self, cell: tuple[int, int], heading: str, shape: tuple[int, int]) -> np.ndarray:
         turned = self.offsets
-        for _ in range(bounds.HEADINGS.index(heading)):
+        for _ in range(HEADINGS.index(heading)):
             turned = np.stack([turned[:, 1], -turned[:, 0]], axis=1)
         seen = turned + np.array(cell)
         return seen[((seen >= 0) & (seen < np.array(shape))).all(axis=1)]
@@ -58,7 +57,7 @@ def best_of_all_paths(
             at = (at[0] + MOVES[heading][0], at[1] + MOVES[heading][1])
             if not (0 <= at[0] < prior.shape[0] and 0 <= at[1] < prior.shape[1]):
                 break
-            looked.append(fov.cells(at, bounds.HEADINGS[heading], prior.shape))
+            looked.append(fov.cells(at, HEADINGS[heading], prior.shape))
         found = curve_of(looked, prior, p_tp)
         best[: len(found)] = np.maximum(best[: len(found)], found)
     return best
@@ -175,7 +174,6 @@ def test_expected_time_and_quantiles_of_a_known_curve() -> None:
     curve = np.array([0.0, 0.5, 0.5, 0.75])
     assert bounds.expected_time(curve) == pytest.approx(1.0 + 0.5 + 0.5)
     np.testing.assert_array_equal(bounds.quantiles(curve, [0.25, 0.5, 0.75, 0.95]), [1, 1, 3, np.inf])
-    assert bounds.above(np.array([0.0, 0.0, 0.0, 0.0]), curve) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

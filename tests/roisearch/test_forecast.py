@@ -61,3 +61,24 @@ def test_it_ends_when_enough_is_gained_and_says_when() -> None:
     assert step is not None
     assert gained[step - 1] < 0.3 <= gained[step]
     assert steps_until(gained, 0.99) is None
+
+
+@pytest.mark.parametrize("view", [FieldOfView.point, FieldOfView.donut])
+def test_with_a_perfect_detector_it_ends_when_nothing_is_left(view: type) -> None:
+    prior, fov = np.full((3, 4), 1 / 12), view(1.0, 0.9)
+    gained = expected_pos(
+        Belief(prior), prior, SearchState((0, 0)), make_planner("index", fov=fov), fov,
+        p_tp=1.0, p_tn=0.9, steps=500,
+    )  # fmt: skip
+    assert len(gained) < 60
+    assert gained[-1] == pytest.approx(1.0)
+
+
+def test_a_perfect_detector_that_has_reported_a_hit_needs_one_look_more() -> None:
+    prior, fov = np.full((3, 4), 1 / 12), FieldOfView.point(1.0, 1.0)
+    belief = Belief(prior)
+    belief.observe([(0, 1)], [True], 1.0, 1.0)
+    gained = expected_pos(
+        belief, prior, SearchState((0, 0)), make_planner("index", fov=fov), fov, p_tp=1.0, p_tn=1.0, steps=50
+    )
+    assert gained == pytest.approx(np.array([0.0, 1 / 12]))

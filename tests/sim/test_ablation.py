@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from roisearch import FieldOfView
 from roisearch.planners.sweep import SweepPlanner
@@ -58,6 +59,49 @@ def test_it_goes_on_where_it_stopped_and_writes_table_summary_and_figure(
     assert "| `index` | 2 |" in (tmp_path / "ablation.md").read_text()
     assert (tmp_path / "summary.json").exists()
     assert (tmp_path / "above-bound.png").stat().st_size > 5000
+
+
+def test_rows_of_another_stop_below_are_not_reused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ablation, "PAPER_STEPS", 30)
+    for stop in ("1e-3", "0.999"):
+        arguments = ["--variants", "index", "--priors", "1", "--stop-below", stop, "--out", str(tmp_path)]
+        assert ablation.main(arguments) == 0
+    with (tmp_path / "results.csv").open(newline="") as file:
+        assert [row["stop_below"] for row in csv.DictReader(file)] == ["0.001", "0.999"]
+
+
+def test_results_with_other_columns_are_refused_and_left_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "results.csv").write_text("variant,fov\n")
+    assert ablation.main(["--variants", "index", "--out", str(tmp_path)]) == 2
+    assert "results.csv has other columns" in capsys.readouterr().err
+    assert (tmp_path / "results.csv").read_text() == "variant,fov\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--fov", "point"], "the bound"),
+        (["--fov", "point", "--p-tn", "0.9"], "the teleporting reference"),
+        (["--fov", "donut", "--p-tn", "0.9"], "the bound"),
+    ],
+)
+def test_table_and_figure_name_what_they_are_set_against_and_show_every_variant(
+    words: list[str], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
+    monkeypatch.setattr(ablation, "PAPER_STEPS", 20)
+    variants = [f"iterations=0,horizon={horizon}" for horizon in range(64, 70)]
+    arguments = ["--variants", " ".join(variants), "--priors", "1", *words, "--out", str(tmp_path)]
+    assert ablation.main(arguments) == 0
+    assert f"| of {named} |" in (tmp_path / "ablation.md").read_text()
+    (panel,) = figures[0].axes
+    assert panel.get_ylabel() == f"E[T] above {named}, %"
+    lines = panel.get_lines()
+    assert [str(line.get_label()).partition(":")[0] for line in lines] == variants
+    assert len({(line.get_marker(), line.get_color()) for line in lines}) == len(variants)
 
 
 def test_an_unknown_setting_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -43,6 +43,8 @@ def test_what_is_given_overrides_the_papers_preset():
 
 def test_rulers_choose_between_searches_and_curves():
     assert (asked("--planners", "index", "--trials", "60").curves) == 0
+    asked_for = asked("--planners", "index", "--trials", "20", "--curves", "10")
+    assert (asked_for.trials, asked_for.curves) == (20, 10)
     both = asked("--planners", "index", "--trials", "60", "--ruler", "both")
     assert (both.trials, both.curves) == (60, 40)
     curve = asked("--planners", "index", "--ruler", "curve", "--curves", "7")
@@ -62,6 +64,10 @@ def test_rulers_choose_between_searches_and_curves():
         (["--planners", "index", "--trials", "0"], "trial"),
         (["--planners", "index", "--start", "5,200"], "start"),
         (["--planners", "index", "--p-tp", "0"], "p_tp"),
+        (
+            ["--planners", "index", "--size", "1,9", "--start", "0,0"],
+            "at least 2 rows and 2 columns, not 1 x 9",
+        ),
         (["--planners", "index", "--cap", "0"], "cap"),
         (["--planners", "index", "--prior", "nowhere.npy"], "nowhere.npy"),
         (["--planners", "index", "--jobs", "0"], "--jobs"),

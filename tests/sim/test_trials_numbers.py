@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from roisearch import FieldOfView, bounds, make_planner
 from sim.ruler import detection_curve
 from sim.trials import published
-from sim.trials.campaign import BOUND, CURVE, FOVS, SEARCH, Campaign, Job
+from sim.trials.campaign import BOUND, CURVE, FOVS, SEARCH, Campaign, Job, load_prior
 from sim.trials.claims import weigh
 from sim.trials.summary import percentiles, ratio, summarise
 from sim.trials.trial import grid, run_job
@@ -107,6 +107,15 @@ def test_a_curve_is_that_of_the_plain_ruler(fov):
     assert np.allclose(curve["curve"], plain[grid(campaign.cap)], atol=1e-9)
 
 
+@pytest.mark.parametrize("p_tn", [1.0, 0.7])
+def test_the_curve_of_a_perfect_detector_ends_when_nothing_is_left(p_tn):
+    prior, view = np.full((4, 5), 1 / 20), FieldOfView.point(1.0, p_tn)
+    planner, rng = make_planner("index", fov=view), np.random.default_rng(0)
+    curve = detection_curve(planner, prior, (0, 0), 1.0, 400, rng, p_tn, view)
+    assert curve[-1] == pytest.approx(1.0)
+    assert (np.diff(curve) >= 0.0).all()
+
+
 def test_searches_are_found_as_often_as_the_curve_says():
     campaign = replace(SMALL, planners=("coverage",), p_tn=1.0, trials=300, cap=200)
     (curve,) = run_job(replace(campaign, trials=0, curves=1), Job(CURVE, "coverage", "point", 0))
@@ -119,6 +128,15 @@ def test_searches_are_found_as_often_as_the_curve_says():
     error = np.std(steps - mean, ddof=1) / np.sqrt(len(steps))
     assert curve["expected"] == expected[0][1]
     assert abs(steps.mean() - mean.mean()) < 4 * error
+
+
+def test_a_searchs_regions_are_those_of_the_planners(tmp_path):
+    prior = np.zeros((8, 10))
+    prior[:, 5:] = 1.0  # flat where the target can be, and so no hill
+    np.save(tmp_path / "flat.npy", prior)
+    campaign = Campaign(planners=("index",), trials=1, cap=5, **load_prior(tmp_path / "flat.npy"))
+    (search,) = run_job(campaign, Job(SEARCH, "index", "point", 0))
+    assert (search["regions"], search["in_region"]) == (0, False)
 
 
 def test_what_is_undetected_at_the_end_counts_as_never_detected():

@@ -108,6 +108,7 @@ class Mission:
             self.why_stopped, self.searched = "", False
         if not (before in FLYING and after in FLYING):
             self.helm.rest()
+            self.resend = False
         if after == State.YIELDED:
             self.vehicle.release_control(reason)
         elif after == State.DONE:

@@ -17,6 +17,7 @@ from service.area import build_grid, read_area  # the search starts from the pri
 from sim.soak import ground
 
 _MAY_STOP = {"HOLDING", "FOUND", "CONFIRMING"}  # the last for another look at a suspect
+_MOST_STOPS = 4  # in a hold: the one at its beginning, and again when one may have been lost
 _MAY_MOVE = {"TAKEOFF", "SEARCHING", "CONFIRMING", "RETURNING"}
 Told = tuple[int, str]
 """What the door told at one moment: how many reports were in, and the belief's digest."""
@@ -70,7 +71,7 @@ def _complete(rows: list[Row], acknowledged: set[str]) -> list[str]:
 
 
 def _moves(rows: list[Row]) -> list[str]:
-    """No waypoint but in a state that may move, one stop at the beginning of a hold, and no gap in the states."""
+    """No waypoint but in a state that may move, few stops in a hold, and no gap in the states."""
     found = []
     state, stops = "WAITING", 0
     for row in rows:
@@ -82,7 +83,9 @@ def _moves(rows: list[Row]) -> list[str]:
         elif row.kind == "command":
             command = row.body["command"]
             stops += command == "hold"
-            if command == "hold" and (state not in _MAY_STOP or (stops > 1 and state != "CONFIRMING")):
+            if command == "hold" and (
+                state not in _MAY_STOP or (stops > _MOST_STOPS and state != "CONFIRMING")
+            ):
                 found.append(f"row {row.seq}: stop {stops} in {state}")
             elif command == "reposition" and state not in _MAY_MOVE:
                 found.append(f"row {row.seq}: a waypoint in {state}")

@@ -39,6 +39,7 @@ def _names(value: object) -> object:
 
 
 Names = Annotated[list[str], BeforeValidator(_names)]
+MOST_BATCH = 10_000  # reports in a request, whatever http.max_batch says
 
 
 class Section(BaseModel):
@@ -130,7 +131,7 @@ class HttpSettings(Section):
     allowed_origins: Names = []
     reports_per_s: float = Field(default=2000.0, ge=1, allow_inf_nan=False)
     commands_per_s: float = Field(default=10.0, ge=1, allow_inf_nan=False)
-    max_batch: int = Field(default=500, ge=1, le=100_000)
+    max_batch: int = Field(default=500, ge=1, le=MOST_BATCH)
     max_body_bytes: int = Field(default=1 << 20, ge=1024, le=1 << 28)
     body_timeout_s: float = Field(default=5.0, gt=0, le=300)
 

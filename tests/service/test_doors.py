@@ -100,6 +100,32 @@ def test_any_bytes_get_a_receipt_for_each_line(data: bytes) -> None:
     assert len(receipts) == sum(bool(line.strip()) for line in data.split(b"\n"))
 
 
+def test_many_lines_are_taken_in_part_by_part_and_others_have_their_turn() -> None:
+    taker, sizes, turns = Taker(), [], 0
+
+    async def submit_all(reports: Sequence[Report]) -> list[Receipt]:
+        sizes.append(len(reports))
+        return await taker.submit_all(reports)
+
+    async def talk() -> bytes:
+        async def others() -> None:
+            nonlocal turns
+            while True:
+                turns += 1
+                await asyncio.sleep(0)
+
+        beside = asyncio.create_task(others())
+        receipts = await answer(lines(*frames(1200)) + b"nonsense\n" * 1000, submit_all)
+        beside.cancel()
+        return receipts
+
+    receipts = said(asyncio.run(talk()))
+    assert [each["status"] for each in receipts] == ["accepted"] * 1200 + ["refused"] * 1000
+    assert [each["id"] for each in receipts[:1200]] == [f"f{number}" for number in range(1200)]
+    assert sizes == [500, 500, 200]
+    assert turns >= 4
+
+
 def test_a_lost_journal_is_told_to_the_sender_who_may_send_again() -> None:
     async def lost(reports: Sequence[Report]) -> list[Receipt]:
         raise JournalLost("the journal j cannot be written: disk full")

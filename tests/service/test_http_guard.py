@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.config import HttpSettings
+from service.config import MOST_BATCH, HttpSettings
 from service.http.address import bind, host_name
 from service.http.rate import Buckets
 
@@ -261,6 +261,16 @@ def test_a_bucket_lets_its_rate_through_and_no_more() -> None:
     passed = sum(buckets.take("a", 10.0, 1.0) == 0.0 for _ in range(30))
     assert passed == 10
     assert buckets.take("a", 10.0, 0.5) > 0.0  # a clock that goes back fills nothing
+
+
+def test_a_batch_of_any_length_is_refused_before_all_of_it_is_checked() -> None:
+    many, run = [{**FRAME, "id": "x"}] * MOST_BATCH, FakeRun()
+    wrong: list[Any] = [{}] * 5
+    http = settings(max_body_bytes=1 << 24)
+    answer = ask("POST", "/api/reports", json=[*many, *wrong], http=http, run=run)
+    assert answer.status_code == 422
+    assert f"at most {MOST_BATCH} items" in answer.text
+    assert run.reports == []
 
 
 def test_a_batch_larger_than_the_bucket_passes_once_and_is_paid_back() -> None:

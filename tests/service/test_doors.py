@@ -368,6 +368,56 @@ def test_a_broker_that_comes_late_or_goes_away_is_called_again_with_name_and_pas
     assert taker.ids == ["f0"]
 
 
+def test_a_broker_that_refuses_the_subscription_is_told_of_and_asked_again(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    asked = asyncio.Event()
+    times = 0
+
+    class Refusing:
+        def __init__(self, *_: object, **__: object) -> None:
+            self.messages = self._messages()
+
+        async def __aenter__(self) -> Refusing:
+            return self
+
+        async def __aexit__(self, *_: object) -> None:
+            return None
+
+        async def _messages(self) -> AsyncIterator[aiomqtt.Message]:
+            await asyncio.get_running_loop().create_future()
+            yield aiomqtt.Message("t", b"", 0, retain=False, mid=0, properties=None)
+
+        async def subscribe(self, topic: str, qos: int) -> tuple[int, ...]:
+            nonlocal times
+            times += 1
+            if times > 1:
+                asked.set()
+            return (0x80,)
+
+    monkeypatch.setattr("service.doors.mqtt.RETRY_S", 0.01)
+    monkeypatch.setattr(aiomqtt, "Client", Refusing)
+
+    async def talk() -> None:
+        async with served(Taker(), mqtt="mqtt://127.0.0.1:1"), asyncio.timeout(5.0):
+            await asked.wait()
+
+    asyncio.run(talk())
+    assert "it refuses the subscription to roisearch/reports" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "url", ["mqtt://me:s@cret@host", "http://me:s@cret@host", "me:s@cret@host", "mqtt://m:s@cret@h:x"]
+)
+def test_a_password_in_the_url_is_refused_and_not_shown(url: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        open_doors(DoorSettings(mqtt=url))
+    said = str(caught.value)
+    assert "…@h" in said
+    assert "cret" not in said.replace("doors.mqtt_credentials_file", "")
+    assert "me:" not in said
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [

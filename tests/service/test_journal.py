@@ -281,8 +281,13 @@ def test_a_failure_that_was_told_is_not_logged_as_forgotten(
         database.execute("DROP TABLE events")
 
     async def write() -> None:
-        with pytest.raises(sqlite3.Error, match="no such table"):
+        told = ""
+        try:
             await journal.append_all([(0.0, "report", "a", "{}")])
+        except sqlite3.Error as error:  # not pytest.raises: it would keep the frames, and so the futures
+            told = str(error)
+        assert "no such table" in told
+        journal.failed = None
         gc.collect()
 
     asyncio.run(write())

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from service.errors import BadInput, shown
 from service.toml_lines import key_lines
@@ -39,6 +39,9 @@ def _names(value: object) -> object:
 
 
 Names = Annotated[list[str], BeforeValidator(_names)]
+Origins = Annotated[Names, AfterValidator(lambda given: [origin.lower().rstrip("/") for origin in given])]
+"""As browsers write them."""
+MOST_BATCH = 10_000  # reports in a request, whatever http.max_batch says
 
 
 class Section(BaseModel):
@@ -127,10 +130,10 @@ class HttpSettings(Section):
     token_file: str = ""
     report_token_file: str = ""
     allowed_hosts: Names = []
-    allowed_origins: Names = []
+    allowed_origins: Origins = []
     reports_per_s: float = Field(default=2000.0, ge=1, allow_inf_nan=False)
     commands_per_s: float = Field(default=10.0, ge=1, allow_inf_nan=False)
-    max_batch: int = Field(default=500, ge=1, le=100_000)
+    max_batch: int = Field(default=500, ge=1, le=MOST_BATCH)
     max_body_bytes: int = Field(default=1 << 20, ge=1024, le=1 << 28)
     body_timeout_s: float = Field(default=5.0, gt=0, le=300)
 

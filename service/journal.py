@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import fcntl
 import json
+import os
 import queue
 import sqlite3
 import threading
@@ -65,7 +67,7 @@ class Journal:
     def __init__(self, path: Path) -> None:
         """Open or create the file, brought up to this version's schema.
 
-        Raises BadInput: it cannot be opened or written, is of a newer schema, or was damaged.
+        Raises BadInput: it cannot be opened or written, is of a newer schema or damaged, or another service writes it.
         """
         self.path = path
         self.failed: Exception | None = None
@@ -73,15 +75,18 @@ class Journal:
         self._queue: queue.SimpleQueue[list[_Entry] | None] = queue.SimpleQueue()
         self._closed = False
         self._last = 0
-        try:
-            self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
-            self._database.execute("PRAGMA journal_mode=WAL")
-            self._database.execute("PRAGMA synchronous=FULL")
-            self._open()
-        except (sqlite3.Error, UnicodeDecodeError) as error:
-            raise BadInput(
-                f"{path}: the journal cannot be opened ({error}); give a writable folder"
-            ) from error
+        with contextlib.ExitStack() as undo:
+            self._lock = _lock(path)
+            undo.callback(os.close, self._lock)
+            try:
+                self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+                undo.callback(self._database.close)
+                self._database.execute("PRAGMA journal_mode=WAL")
+                self._database.execute("PRAGMA synchronous=FULL")
+                self._open()
+            except (sqlite3.Error, UnicodeDecodeError) as error:
+                raise _cannot_open(path, error) from error
+            undo.pop_all()
         self._writer = threading.Thread(target=self._write, name="journal", daemon=True)
         self._writer.start()
 
@@ -148,7 +153,8 @@ class Journal:
         if not entries:
             return []
         self._enqueue(entries)
-        await asyncio.wait([asyncio.wrap_future(entries[-1].done)])  # the outcomes come in their order
+        # the outcomes come in their order; gathered, so that a failure that nobody asks for is not logged as forgotten
+        await asyncio.gather(asyncio.wrap_future(entries[-1].done), return_exceptions=True)
         failures = [entry.done.exception() for entry in entries]
         for failure in failures:
             if failure is not None and not isinstance(failure, Duplicate):
@@ -162,6 +168,7 @@ class Journal:
             self._queue.put(None)
             self._writer.join()
             self._database.close()
+            os.close(self._lock)
 
     def _write(self) -> None:
         """The writer thread: one transaction for all that has gathered."""
@@ -185,6 +192,8 @@ class Journal:
                     last += 1
                     outcomes.append((entry, last))
                 except sqlite3.IntegrityError:
+                    if not self._knows(entry.key):
+                        raise
                     outcomes.append((entry, Duplicate(f"'{entry.key}' is in the journal already")))
             self._database.execute("COMMIT")
             self._last = last
@@ -199,6 +208,36 @@ class Journal:
                 entry.done.set_exception(outcome)
             else:
                 entry.done.set_result(outcome)
+
+    def _knows(self, key: str | None) -> bool:
+        found = self._database.execute("SELECT 1 FROM events WHERE key = ?", (key,)).fetchone()
+        return found is not None
+
+
+def _lock(path: Path) -> int:
+    """The open lock file beside a journal, held by this process alone until it is closed, or the process ends.
+
+    The file stays: were it removed, two could hold locks on two files of that name.
+    """
+    try:
+        lock = os.open(path.with_name(path.name + ".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise _cannot_open(path, error) from error
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(lock)
+        raise BadInput(
+            f"{path}: this run is being flown by another service; end that one first, or begin a new run"
+        ) from None
+    except OSError as error:
+        os.close(lock)
+        raise _cannot_open(path, error) from error
+    return lock
+
+
+def _cannot_open(path: Path, error: Exception) -> BadInput:
+    return BadInput(f"{path}: the journal cannot be opened ({error}); give a writable folder")
 
 
 _ROWS = "SELECT seq, time, kind, key, body"
@@ -249,7 +288,10 @@ def _open_to_read(path: Path) -> sqlite3.Connection:
     if not path.is_file():
         raise BadInput(f"{path}: there is no journal here; give the folder of a run")
     address = path.resolve().as_uri()
-    database = sqlite3.connect(f"{address}?mode=ro", uri=True)
+    try:
+        database = sqlite3.connect(f"{address}?mode=ro", uri=True)
+    except sqlite3.Error as error:
+        raise BadInput(f"{path}: the journal cannot be read ({error}); see who may read it") from error
     try:
         database.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except sqlite3.OperationalError:  # a finished run where not even SQLite's own files may be written
@@ -287,7 +329,7 @@ def read_last(path: Path, kind: str, count: int, before: float | None = None) ->
         until = 1e300 if before is None else before
         found = database.execute(query, (kind, until, count)).fetchall()
         return [Row(seq, time, kind, key, json.loads(body)) for seq, time, kind, key, body in found]
-    except sqlite3.Error as error:
+    except (sqlite3.Error, ValueError) as error:
         raise BadInput(f"{path}: the journal cannot be read ({error})") from error
     finally:
         database.close()

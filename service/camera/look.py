@@ -50,7 +50,10 @@ def look_at_cells(
     nothing = Looks(np.empty((0, 2), dtype=np.int64), np.empty(0), np.empty(0))
     if sight.position[2] <= float(ground.height_at(sight.position[None, :2])[0]):
         return nothing
-    cells = _candidates(sight, ground, frame, max_range_m, bounded)
+    sin_least = math.sin(math.radians(min_grazing_deg))
+    above = float(sight.position[2]) - ground.lowest_m
+    reach = min(max_range_m, above / max(sin_least, 1e-9))  # what is farther is seen too flat
+    cells = _candidates(sight, ground, frame, reach, bounded)
     if not len(cells):
         return nothing
     flat = ((cells[:, None, ::-1] + _UNIT[None]) * frame.cell_m).reshape(-1, 2)
@@ -59,7 +62,7 @@ def look_at_cells(
     far = np.linalg.norm(gap, axis=1)
     sin_grazing = -gap[:, 2] / np.maximum(far, 1e-9)
     seen = sight.in_image(points) & (far <= max_range_m)
-    seen &= sin_grazing >= math.sin(math.radians(min_grazing_deg))
+    seen &= sin_grazing >= sin_least
     at = np.flatnonzero(seen)
     at = at[ground.in_sight(sight.position, points[at])]
     chance = np.zeros(len(points))

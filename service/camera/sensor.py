@@ -20,10 +20,12 @@ from service.camera.detect import Detectability
 from service.camera.ground import Flat, Ground
 from service.camera.locate import Errors, Spot, locate_pixel, spread_hits
 from service.camera.look import Looks, look_at_cells
-from service.camera.optics import Pinhole, Sight, rotation, sight_from
+from service.camera.optics import Floats, Pinhole, Sight, rotation, sight_from
 from service.evidence.calibration import Calibration
 from service.evidence.observe import Footprint, Pose, Reading, Sighting, Unreadable
 from service.evidence.reports import Detection, Gimbal, Intrinsics, Report
+
+_FAR_CORNER = 10.0  # times the range: so far from the camera may a corner of an outline be
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class CameraSensor:
         """
         sight = self.sight(pose, report.gimbal, report.intrinsics)
         outline = report.footprint
-        footprint = self._footprint(sight) if outline is None else self._outlined(outline)
+        footprint = self._footprint(sight) if outline is None else self._outlined(outline, sight.position[:2])
         if self.calibration is not None and (looks := self.calibration.at(report.threshold)) is not None:
             better, worse = looks[0] / self.detect.p_tp, (1.0 - looks[1]) / (1.0 - self.p_tn)
             p_tp, p_tn = footprint.p_tp * better, 1.0 - (1.0 - footprint.p_tn) * worse
@@ -113,14 +115,22 @@ class CameraSensor:
         kept = looks.covered >= 0.5 * self.min_covered
         return Footprint(looks.cells[kept], looks.covered[kept], counts[kept], looks.p_tp[kept], p_tn[kept])
 
-    def _outlined(self, outline: tuple[tuple[float, float], ...]) -> Footprint:
-        """The cells of a polygon that the sender drew, each worth the nominal p_tp times its part inside."""
-        shape = shapely.Polygon([(lon, lat) for lat, lon in outline])
-        if not shape.is_valid or shape.area == 0.0:
+    def _outlined(self, outline: tuple[tuple[float, float], ...], camera: Floats) -> Footprint:
+        """The cells of a polygon that the sender drew, each worth the nominal p_tp times its part inside.
+
+        Its sides are straight on the grid's plane, so that they cost the same whatever they span.
+        """
+        corners, most = self.frame.to_metres(outline), _FAR_CORNER * self.max_range_m
+        if not (np.linalg.norm(corners - camera, axis=1) <= most).all():  # also what is not finite
+            raise Unreadable(
+                f"a corner of the footprint is more than {most:g} m from the camera, {_FAR_CORNER:g} times "
+                "sensor.max_range_m; give the corners of the ground that the frame shows"
+            )
+        flat = shapely.Polygon(corners)
+        if not flat.is_valid or flat.area < 1.0:
             raise Unreadable(
                 "the footprint is not a polygon: its sides cross, or its corners lie in one line"
             )
-        flat = self.frame.flatten(shape)
         west, north, east, south = np.array(flat.bounds) / self.frame.cell_m
         top, bottom = max(0, math.floor(north)), min(self.frame.rows, math.floor(south) + 1)
         left, right = max(0, math.floor(west)), min(self.frame.cols, math.floor(east) + 1)

@@ -20,6 +20,7 @@ from service.secret_file import read_secret
 
 if TYPE_CHECKING:
     from aiomqtt import Client
+    from paho.mqtt.reasoncodes import ReasonCode
 
 log = logging.getLogger("roisearch")
 PORTS = {"mqtt": 1883, "mqtts": 8883}
@@ -52,8 +53,8 @@ def read_broker(url: str, topic: str, credentials_file: str) -> Broker:
         host, port = None, None
     if not host or parts.scheme not in PORTS or parts.path.strip("/") or parts.username is not None:
         raise BadInput(
-            f"doors.mqtt = '{url}' is not a broker; give mqtt://HOST:PORT, or mqtts:// for TLS, and credentials in "
-            "doors.mqtt_credentials_file"
+            f"doors.mqtt = '{_without_password(url)}' is not a broker; give mqtt://HOST:PORT, or mqtts:// for "
+            "TLS, and credentials in doors.mqtt_credentials_file"
         )
     if not topic or any(sign in topic for sign in "+#\0"):
         raise BadInput(f"doors.mqtt_topic = '{topic}' is not a topic; wildcards are not allowed")
@@ -67,6 +68,14 @@ def read_broker(url: str, topic: str, credentials_file: str) -> Broker:
             raise BadInput(f"{credentials_file}: the credentials are one line, NAME:PASSWORD")
     tls = parts.scheme == "mqtts"
     return Broker(url, host, port or PORTS[parts.scheme], tls, topic, user, password)
+
+
+def _without_password(url: str) -> str:
+    """The URL as it may be shown: nothing of what stands before an @, the last if there are several."""
+    before, at, rest = url.rpartition("@")
+    return (
+        f"{before.partition('://')[0]}://…@{rest}" if at and "://" in before else f"…@{rest}" if at else url
+    )
 
 
 async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
@@ -83,17 +92,24 @@ async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
                 password=broker.password,
                 tls_context=ssl.create_default_context() if broker.tls else None,
             ) as client:
-                await client.subscribe(broker.topic, qos=_QOS)
+                granted = await client.subscribe(broker.topic, qos=_QOS)
+                if any(_refused(code) for code in granted):
+                    raise aiomqtt.MqttError(f"it refuses the subscription to {broker.topic}; see its rights")
                 log.info("reports are taken from %s at %s", broker.topic, broker.url)
                 told = ""
                 await _listen(client, broker, submit)
         except* (aiomqtt.MqttError, OSError) as group:
             reason = str(group.exceptions[0])
             if reason != told:
-                log.warning("the MQTT broker %s cannot be reached (%s): trying again", broker.url, reason)
+                log.warning("the MQTT broker %s cannot be used (%s): trying again", broker.url, reason)
             told = reason
             _end_if_cancelled()
         await asyncio.sleep(RETRY_S)
+
+
+def _refused(code: int | ReasonCode) -> bool:
+    """Whether a SUBACK's code is a failure (MQTT 3.1.1, 3.9.3)."""
+    return (code if isinstance(code, int) else code.value) >= 0x80
 
 
 def _end_if_cancelled() -> None:

@@ -29,6 +29,7 @@ from service.errors import BadInput
 
 _FORMS = ({"score", "likelihood_ratio"}, {"score", "p_tp", "p_tn"})
 _MOST_BYTES = 1 << 20
+_MOST_RATIO = 1e6  # what one hit can prove; far more, and 1 - p_tn is nothing
 
 
 @dataclass(frozen=True)
@@ -66,38 +67,43 @@ def calibration_of(settings: Settings) -> Calibration | None:
 
 def read_calibration(path: str) -> Calibration:
     """The table in a file. Raises BadInput with the line that is wrong and what would be right."""
-    columns = _columns(path)
+    lines, columns = _columns(path)
     scores = columns["score"]
-    for number, (before, after) in enumerate(pairwise(scores), start=3):
+    for line, (before, after) in zip(lines[1:], pairwise(scores), strict=True):
         if after <= before:
             raise BadInput(
-                f"{path}, line {number}: the score {after:g} does not rise above {before:g}; sort the rows"
+                f"{path}, line {line}: the score {after:g} does not rise above {before:g}; sort the rows"
             )
     if "likelihood_ratio" in columns:
-        return _of_ratios(path, scores, columns["likelihood_ratio"])
-    return _of_roc(path, scores, list(zip(columns["p_tp"], columns["p_tn"], strict=True)))
+        return _of_ratios(path, lines, scores, columns["likelihood_ratio"])
+    return _of_roc(path, lines, scores, list(zip(columns["p_tp"], columns["p_tn"], strict=True)))
 
 
-def _of_ratios(path: str, scores: list[float], ratios: list[float]) -> Calibration:
-    for number, ratio in enumerate(ratios, start=2):
-        if ratio <= 0.0:
-            raise BadInput(f"{path}, line {number}: a likelihood_ratio is above 0, not {ratio:g}")
-        if number > 2 and ratio < ratios[number - 3]:
+def _of_ratios(path: str, lines: list[int], scores: list[float], ratios: list[float]) -> Calibration:
+    for line, before, ratio in zip(lines, [0.0, *ratios], ratios, strict=False):
+        if not 1.0 / _MOST_RATIO <= ratio <= _MOST_RATIO:
             raise BadInput(
-                f"{path}, line {number}: the likelihood_ratio falls from {ratios[number - 3]:g} to {ratio:g}, so a "
+                f"{path}, line {line}: a likelihood_ratio is above 0, from {1.0 / _MOST_RATIO:g} to {_MOST_RATIO:g}, "
+                f"not {ratio:g}"
+            )
+        if ratio < before:
+            raise BadInput(
+                f"{path}, line {line}: the likelihood_ratio falls from {before:g} to {ratio:g}, so a "
                 "higher score would be worth less; take such rows together"
             )
     return Calibration(tuple(scores), tuple(math.log(ratio) for ratio in ratios))
 
 
-def _of_roc(path: str, scores: list[float], points: list[tuple[float, float]]) -> Calibration:
-    for number, (p_tp, p_tn) in enumerate(points, start=2):
+def _of_roc(
+    path: str, lines: list[int], scores: list[float], points: list[tuple[float, float]]
+) -> Calibration:
+    for line, before, (p_tp, p_tn) in zip(lines, [(1.0, 0.0), *points], points, strict=False):
         if not (0.0 < p_tp < 1.0 and 0.0 < p_tn < 1.0):
             raise BadInput(
-                f"{path}, line {number}: p_tp and p_tn are between 0 and 1, not {p_tp:g} and {p_tn:g}"
+                f"{path}, line {line}: p_tp and p_tn are between 0 and 1, not {p_tp:g} and {p_tn:g}"
             )
-        if number > 2 and (p_tp > points[number - 3][0] or p_tn < points[number - 3][1]):
-            raise BadInput(f"{path}, line {number}: with a higher score p_tp cannot rise nor p_tn fall")
+        if p_tp > before[0] or p_tn < before[1]:
+            raise BadInput(f"{path}, line {line}: with a higher score p_tp cannot rise nor p_tn fall")
     steps: list[tuple[float, float, float]] = []  # from which score, share of hits, share of false alarms
     for score, (p_tp, p_tn), (next_tp, next_tn) in zip(
         scores, points, [*points[1:], (0.0, 1.0)], strict=True
@@ -114,15 +120,25 @@ def _of_roc(path: str, scores: list[float], points: list[tuple[float, float]]) -
                 f"{path}: {what} was seen with scores from {score:g} on, so a hit there would prove everything or "
                 "nothing; take rows together, or count half a case more"
             )
+        if not 1.0 / _MOST_RATIO <= hits / alarms <= _MOST_RATIO:
+            raise BadInput(
+                f"{path}: a hit with scores from {score:g} on would be worth a likelihood ratio of {hits / alarms:g}, "
+                f"which no count of cases shows; it is from {1.0 / _MOST_RATIO:g} to {_MOST_RATIO:g}"
+            )
     ratios = tuple(math.log(hits / alarms) for _, hits, alarms in steps)
     return Calibration(tuple(step[0] for step in steps), ratios, tuple(scores), tuple(points))
 
 
-def _columns(path: str) -> dict[str, list[float]]:
-    """The file's columns by name."""
+def _columns(path: str) -> tuple[list[int], dict[str, list[float]]]:
+    """Which line of the file each row is, from 1, and the file's columns by name."""
     try:
-        with Path(path).open(encoding="utf-8", newline="") as stream:
-            rows = [row for row in csv.reader(stream.read(_MOST_BYTES).splitlines()) if row]
+        with Path(path).open("rb") as stream:
+            data = stream.read(_MOST_BYTES + 1)
+        if len(data) > _MOST_BYTES:
+            raise BadInput(f"{path}: the calibration has more than {_MOST_BYTES} bytes; give a shorter table")
+        reader = csv.reader(data.decode("utf-8-sig").splitlines())
+        numbered = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+        lines, rows = [number for number, _ in numbered], [row for _, row in numbered]
     except (OSError, ValueError) as error:  # ValueError: not UTF-8
         raise BadInput(f"{path}: the calibration cannot be read ({error}); give a CSV file") from error
     except csv.Error as error:
@@ -136,17 +152,17 @@ def _columns(path: str) -> dict[str, list[float]]:
     if len(rows) < 2:
         raise BadInput(f"{path}: there are no rows below the names of the columns")
     columns: dict[str, list[float]] = {name: [] for name in names}
-    for number, row in enumerate(rows[1:], start=2):
+    for line, row in zip(lines[1:], rows[1:], strict=True):
         try:
             values = [float(cell) for cell in row]
             if len(values) != len(names) or not all(map(math.isfinite, values)):
                 raise ValueError
         except ValueError:
             raise BadInput(
-                f"{path}, line {number}: '{','.join(row)[:80]}' is not {len(names)} numbers"
+                f"{path}, line {line}: '{','.join(row)[:80]}' is not {len(names)} numbers"
             ) from None
         for name, value in zip(names, values, strict=True):
             columns[name].append(value)
     if min(columns["score"]) < 0.0 or max(columns["score"]) > 1.0:
         raise BadInput(f"{path}: scores lie between 0 and 1")
-    return columns
+    return lines[1:], columns

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import sqlite3
 import time
 from collections import OrderedDict
@@ -29,6 +30,7 @@ from service.evidence.verdict import verdict_on, verdict_row
 from service.journal import Journal
 from service.search import Search
 
+log = logging.getLogger("roisearch")
 PoseAt = Callable[[float], Pose | None]
 PIECE, PIECE_S = (
     64,
@@ -37,6 +39,7 @@ PIECE, PIECE_S = (
 # behind a large batch does not wait for all of it, nor does the flight for a camera's geometry
 MOST_WAITING = 20_000
 MOST_IDS = 200_000  # what is older than these, the journal itself knows
+_MOST_CHARACTERS = 200
 AHEAD_S = 0.5  # how far in the future of the service's clock a frame may be: as far as a pose is carried on
 
 
@@ -171,8 +174,33 @@ class Intake:
     async def _take(self, piece: list[_Waiting]) -> None:
         """Work out what each report means, write them all, and then believe them."""
         new: dict[str, tuple[_Waiting, Observation | None]] = {}
-        rows: list[tuple[float, str, str, str]] = []
         repeated: list[_Waiting] = []
+        try:
+            rows = self._understand(piece, new, repeated)
+            fresh = await self.journal.append_all(rows)
+        except Exception as error:
+            self.passes.undo()  # whatever it was: the same reports may come again
+            if isinstance(error, (sqlite3.Error, OSError)):
+                raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
+            raise
+        self.passes.settle()
+        self.remember(new)
+        for (each, observation), is_new in zip(new.values(), fresh, strict=True):
+            if is_new:
+                self._believe(each, observation)
+            else:
+                repeated.append(each)
+        for each in repeated:
+            each.settle(Receipt(id=each.report.id, status="duplicate"))
+
+    def _understand(
+        self,
+        piece: list[_Waiting],
+        new: dict[str, tuple[_Waiting, Observation | None]],
+        repeated: list[_Waiting],
+    ) -> list[tuple[float, str, str, str]]:
+        """What each report means, until the time is up; the rest waits again. Returns the rows of those in `new`."""
+        rows: list[tuple[float, str, str, str]] = []
         enough = time.perf_counter() + PIECE_S
         for number, each in enumerate(piece):
             if time.perf_counter() > enough:
@@ -189,25 +217,20 @@ class Intake:
             except Unreadable as why:
                 self._refuse(each, str(why))
                 continue
+            except Exception as fault:  # one report that we cannot work out must not cost the others theirs
+                log.exception("report %r could not be read", report.id)
+                why_not = f"{type(fault).__name__}: {fault}"[:_MOST_CHARACTERS]
+                self._refuse(
+                    each,
+                    f"what the frame shows cannot be worked out ({why_not}); check its pose, gimbal and intrinsics",
+                )
+                continue
             observation = None
             if report.usable:
                 observation = observe(self.passes, report.source, each.captured, reading)
             new[report.id] = (each, observation)
             rows.append((self.clock.now(), "report", f"report {report.id}", _row(report, pose, observation)))
-        try:
-            fresh = await self.journal.append_all(rows)
-        except (sqlite3.Error, OSError) as error:
-            self.passes.undo()
-            raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
-        self.passes.settle()
-        self.remember(new)
-        for (each, observation), is_new in zip(new.values(), fresh, strict=True):
-            if is_new:
-                self._believe(each, observation)
-            else:
-                repeated.append(each)
-        for each in repeated:
-            each.settle(Receipt(id=each.report.id, status="duplicate"))
+        return rows
 
     def _believe(self, each: _Waiting, observation: Observation | None) -> None:
         self.accepted += 1
@@ -224,12 +247,12 @@ class Intake:
 
     def _place(self, waiting: list[_Waiting]) -> None:
         """Put each report at its time of capture in the service's clock, or refuse it."""
-        now = self.clock.now()
+        now, room = self.clock.now(), MOST_WAITING - len(self._waiting)
         for each in waiting:
             report, captured = each.report, each.captured
             if report.id in self._ids:
                 continue
-            if len(self._waiting) >= MOST_WAITING:
+            if room <= 0:
                 self._refuse(
                     each, f"{MOST_WAITING} reports are waiting already; send it again, and more slowly"
                 )
@@ -253,6 +276,8 @@ class Intake:
                     f"captured_at {captured:.3f} is {captured - now:.1f} s in the future of the service's clock, "
                     "which GET /api/state tells",
                 )
+            else:
+                room -= 1
 
     def _refuse(self, each: _Waiting, reason: str) -> None:
         self.refused += 1

@@ -181,10 +181,10 @@ class Sensor:
                 "the sensor profile cannot place a pixel box; give the lat and lon of each detection"
             )
         footprint = self.footprint(pose)
-        hits = self._hits(report, footprint)
         if self.calibration is not None and (looks := self.calibration.at(report.threshold)) is not None:
             k = len(footprint.cells)
             footprint = replace(footprint, p_tp=np.full(k, looks[0]), p_tn=np.full(k, looks[1]))
+        hits = self._hits(report, footprint)
         return Reading(footprint, hits, sightings(report, self.frame, hits))
 
     def footprint(self, pose: Pose) -> Footprint:

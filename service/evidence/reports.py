@@ -24,7 +24,7 @@ Longitude = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
 Score = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Pixel = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
-Pixels = Annotated[float, Field(gt=0, le=1_000_000, allow_inf_nan=False)]
+FocalLength = Annotated[float, Field(ge=10, le=1_000_000, allow_inf_nan=False)]
 
 
 def _one_of(first: dict[str, str], second: dict[str, str]) -> dict[str, Any]:
@@ -123,12 +123,12 @@ class Intrinsics(DoorModel):
 
     width: int = Field(gt=0, le=100_000, description="pixels")
     height: int = Field(gt=0, le=100_000, description="pixels")
-    fx: Pixels | None = Field(default=None, description="focal length in pixels, along the width")
-    fy: Pixels | None = Field(default=None, description="focal length in pixels, along the height")
+    fx: FocalLength | None = Field(default=None, description="focal length in pixels, along the width")
+    fy: FocalLength | None = Field(default=None, description="focal length in pixels, along the height")
     cx: Pixel | None = Field(default=None, description="principal point; without it, half the width")
     cy: Pixel | None = Field(default=None, description="principal point; without it, half the height")
     horizontal_fov_deg: float | None = Field(
-        default=None, gt=0, lt=180, allow_inf_nan=False, description="from the left to the right edge"
+        default=None, ge=0.1, le=179, allow_inf_nan=False, description="from the left to the right edge"
     )
 
     @model_validator(mode="after")

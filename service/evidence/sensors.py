@@ -94,6 +94,11 @@ def camera_sensor(settings: Settings, frame: GridFrame, ground: Ground | None = 
     camera = Pinhole.of_angles(
         sensor.image_width_px, sensor.image_height_px, sensor.horizontal_fov_deg, sensor.vertical_fov_deg
     )
+    if sensor.min_p_tp > sensor.p_tp:
+        raise BadInput(
+            f"sensor.min_p_tp = {sensor.min_p_tp:g} is above sensor.p_tp = {sensor.p_tp:g}, so no look would ever "
+            "count; give one below it"
+        )
     tilt = math.sin(math.radians(-sensor.camera_pitch_deg))
     if sensor.camera_pitch_deg > -sensor.min_grazing_deg or height > sensor.max_range_m * tilt:
         raise BadInput(
@@ -140,6 +145,11 @@ def _shorter_side(settings: Settings) -> float:
         there.sight(pose), there.ground, there.frame, there.detect,
         max_range_m=there.max_range_m, min_grazing_deg=there.min_grazing_deg, bounded=False,
     )  # fmt: skip
+    if not len(looks.cells):
+        raise BadInput(
+            f"nothing is in view from {pose.height_m:g} m well enough to count; fly lower, tilt the camera down, or "
+            "give a lower sensor.min_p_tp"
+        )
     area = float(looks.covered.sum()) * fine**2
     _, rows = np.unique(looks.cells[:, 1], return_counts=True)
     depth = float(rows.max()) * fine

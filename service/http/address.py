@@ -8,6 +8,7 @@ import socket
 from service.errors import BadInput
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
+_BACKLOG = 2048
 
 
 def split_address(text: str) -> tuple[str, int]:
@@ -26,6 +27,7 @@ def bind(host: str, port: int) -> socket.socket:
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
+        listener.listen(_BACKLOG)  # two may be bound to a port, but only one can listen
     except (OSError, ValueError) as error:  # ValueError: a name that cannot be written in DNS
         listener.close()
         reason = getattr(error, "strerror", None) or error

@@ -13,9 +13,10 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.models import Example
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+from pydantic import Field
 from starlette.middleware.cors import CORSMiddleware
 
-from service.config import HttpSettings
+from service.config import MOST_BATCH, HttpSettings
 from service.evidence.intake import JournalLost
 from service.evidence.reports import EXAMPLES, Command, Receipt, Report
 from service.http import examples
@@ -32,6 +33,8 @@ At = Annotated[
     float | None,
     Query(description="of a replay: the time to look at, seconds since the epoch", allow_inf_nan=False),
 ]
+Batch = Annotated[list[Report], Field(max_length=MOST_BATCH)]
+"""Bounded before its reports are checked, which takes longer than reading them."""
 PNG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/png": {}}}}
 
 _MOST_COMPLAINTS = 8
@@ -100,7 +103,7 @@ def create_app(
     )
     async def reports(
         request: Request,
-        body: Annotated[Report | list[Report], Body(openapi_examples=openapi_examples(EXAMPLES))],
+        body: Annotated[Report | Batch, Body(openapi_examples=openapi_examples(EXAMPLES))],
     ) -> Response:
         only_live()
         batch = body if isinstance(body, list) else [body]

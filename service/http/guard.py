@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import contextlib
+import ipaddress
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -93,7 +94,7 @@ class Guard:
         given = [*names, *http.allowed_hosts]
         self._names = LOOPBACK_NAMES | {name for name in map(host_name, given) if name}
         self._any_address = any_address
-        self._origins = frozenset(origin.lower().rstrip("/") for origin in http.allowed_origins)
+        self._origins = frozenset(http.allowed_origins)
         self._buckets = buckets
         self._now = now
 
@@ -274,8 +275,15 @@ def too_many(per_s: float, wait_s: float) -> Refusal:
 
 
 def _local_address(request: Request) -> str | None:
+    """The address that a request came to; IPv4's own also where it came to a socket of both."""
     server = request.get("server")
-    return str(server[0]).lower().partition("%")[0] if server else None
+    if not server:
+        return None
+    text = str(server[0]).lower().partition("%")[0]
+    with contextlib.suppress(ValueError):
+        mapped = ipaddress.IPv6Address(text).ipv4_mapped
+        return text if mapped is None else str(mapped)
+    return text
 
 
 def _same(origin: str, host: str) -> bool:

@@ -77,7 +77,8 @@ def test_what_the_hits_are_worth_averages_out_over_false_alarms(counts: list[tup
     above_hits, above_alarms = hits[::-1].cumsum()[::-1], alarms[::-1].cumsum()[::-1]
     p_tp, fp = above_hits / (hits.sum() + 5), above_alarms / (alarms.sum() + 5)
     scores = [(i + 1) / 10 for i in range(len(counts))]
-    calibration = _of_roc("t", scores, list(zip(p_tp.tolist(), (1 - fp).tolist(), strict=True)))
+    lines = list(range(2, 2 + len(scores)))
+    calibration = _of_roc("t", lines, scores, list(zip(p_tp.tolist(), (1 - fp).tolist(), strict=True)))
     mean = sum(
         share * calibration.ratio(score) for share, score in zip(alarms / alarms.sum(), scores, strict=True)
     )
@@ -140,6 +141,15 @@ def test_a_miss_is_worth_what_it_is_at_the_threshold(tmp_path: Path) -> None:
         ("score,likelihood_ratio\n0.5,3\n0.4,4\n", "line 3: the score 0.4 does not rise"),
         ("score,likelihood_ratio\n0.5,3\n0.6,2\n", "line 3: the likelihood_ratio falls from 3 to 2"),
         ("score,likelihood_ratio\n0.5,3\n1.6,4\n", "between 0 and 1"),
+        (
+            "score,likelihood_ratio\n0.5,3\n0.6,1e17\n",
+            "line 3: a likelihood_ratio is above 0, from 1e-06 to 1e+06",
+        ),
+        ("score,likelihood_ratio\n0.5,1e-17\n", "line 2: a likelihood_ratio is above 0, from 1e-06 to 1e+06"),
+        ("score,p_tp,p_tn\n0.5,0.9,0.999999999999\n", "a hit with scores from 0.5 on would be worth"),
+        ("\nscore,likelihood_ratio\n\n0.5,3\n \n0.6,2\n", "line 6: the likelihood_ratio falls from 3 to 2"),
+        ("score,likelihood_ratio\n\n0.5,3\n\n\n0.6,x\n", "line 6: '0.6,x' is not 2 numbers"),
+        ("score,likelihood_ratio\n" + "0.5,3\n" * 200_000, "more than 1048576 bytes"),
         ("score,p_tp,p_tn\n0.5,0.9,1\n", "line 2: p_tp and p_tn are between 0 and 1"),
         ("score,p_tp,p_tn\n0.5,0.9,0.9\n0.6,0.95,0.95\n", "line 3: with a higher score"),
         ("score,p_tp,p_tn\n0.5,0.9,0.9\n0.6,0.9,0.95\n", "no target was seen with scores from 0.5"),
@@ -155,6 +165,25 @@ def test_a_wrong_table_is_refused_with_its_line(tmp_path: Path, text: str, words
     with pytest.raises(BadInput, match=r"scores\.csv") as caught:
         table(tmp_path, text)
     assert words in str(caught.value)
+
+
+def test_a_table_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    assert table(tmp_path, "\ufeff" + RATIOS).ratio(0.6) == pytest.approx(8.0)
+
+
+def test_a_detection_is_spread_with_the_likelihoods_of_its_threshold(tmp_path: Path) -> None:
+    """It lies on the border of two cells in view: each one's odds are the mean of a hit's and a miss's, and the miss
+    is worth what it is at the report's threshold."""
+    calibration = table(tmp_path, ROC)
+    s = Sensor(FRAME, FieldOfView.donut(0.9, 0.9), 0.9, 0.9, 0.2, 0.8, 30.0, calibration)
+    lat, lon = FRAME.to_latlon([[5, 5]])[0].tolist()
+    there = FRAME.to_latlon([[4, 4.5]])[0].tolist()
+    seen = {"lat": there[0], "lon": there[1], "score": 0.3, "accuracy_m": 5.0}
+    report = Report.model_validate({"id": "a", "captured_at": 1.0, "threshold": 0.5, "detections": [seen]})
+    reading = s.read(Pose(lat, lon, 30.0, 0.0, 1.0), report)
+    wanted = 0.5 * calibration.ratio(0.3) + 0.5 * (1.0 - 0.8) / 0.95
+    for cell in ((4, 4), (4, 5)):
+        assert reading.hits[cell] == pytest.approx(wanted, rel=0.02)
 
 
 def test_a_missing_table_is_named(tmp_path: Path) -> None:

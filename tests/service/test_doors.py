@@ -100,6 +100,32 @@ def test_any_bytes_get_a_receipt_for_each_line(data: bytes) -> None:
     assert len(receipts) == sum(bool(line.strip()) for line in data.split(b"\n"))
 
 
+def test_many_lines_are_taken_in_part_by_part_and_others_have_their_turn() -> None:
+    taker, sizes, turns = Taker(), [], 0
+
+    async def submit_all(reports: Sequence[Report]) -> list[Receipt]:
+        sizes.append(len(reports))
+        return await taker.submit_all(reports)
+
+    async def talk() -> bytes:
+        async def others() -> None:
+            nonlocal turns
+            while True:
+                turns += 1
+                await asyncio.sleep(0)
+
+        beside = asyncio.create_task(others())
+        receipts = await answer(lines(*frames(1200)) + b"nonsense\n" * 1000, submit_all)
+        beside.cancel()
+        return receipts
+
+    receipts = said(asyncio.run(talk()))
+    assert [each["status"] for each in receipts] == ["accepted"] * 1200 + ["refused"] * 1000
+    assert [each["id"] for each in receipts[:1200]] == [f"f{number}" for number in range(1200)]
+    assert sizes == [500, 500, 200]
+    assert turns >= 4
+
+
 def test_a_lost_journal_is_told_to_the_sender_who_may_send_again() -> None:
     async def lost(reports: Sequence[Report]) -> list[Receipt]:
         raise JournalLost("the journal j cannot be written: disk full")
@@ -340,6 +366,56 @@ def test_a_broker_that_comes_late_or_goes_away_is_called_again_with_name_and_pas
 
     asyncio.run(talk())
     assert taker.ids == ["f0"]
+
+
+def test_a_broker_that_refuses_the_subscription_is_told_of_and_asked_again(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    asked = asyncio.Event()
+    times = 0
+
+    class Refusing:
+        def __init__(self, *_: object, **__: object) -> None:
+            self.messages = self._messages()
+
+        async def __aenter__(self) -> Refusing:
+            return self
+
+        async def __aexit__(self, *_: object) -> None:
+            return None
+
+        async def _messages(self) -> AsyncIterator[aiomqtt.Message]:
+            await asyncio.get_running_loop().create_future()
+            yield aiomqtt.Message("t", b"", 0, retain=False, mid=0, properties=None)
+
+        async def subscribe(self, topic: str, qos: int) -> tuple[int, ...]:
+            nonlocal times
+            times += 1
+            if times > 1:
+                asked.set()
+            return (0x80,)
+
+    monkeypatch.setattr("service.doors.mqtt.RETRY_S", 0.01)
+    monkeypatch.setattr(aiomqtt, "Client", Refusing)
+
+    async def talk() -> None:
+        async with served(Taker(), mqtt="mqtt://127.0.0.1:1"), asyncio.timeout(5.0):
+            await asked.wait()
+
+    asyncio.run(talk())
+    assert "it refuses the subscription to roisearch/reports" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "url", ["mqtt://me:s@cret@host", "http://me:s@cret@host", "me:s@cret@host", "mqtt://m:s@cret@h:x"]
+)
+def test_a_password_in_the_url_is_refused_and_not_shown(url: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        open_doors(DoorSettings(mqtt=url))
+    said = str(caught.value)
+    assert "…@h" in said
+    assert "cret" not in said.replace("doors.mqtt_credentials_file", "")
+    assert "me:" not in said
 
 
 @pytest.mark.parametrize(

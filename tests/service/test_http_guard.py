@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import re
 import socket
+from contextlib import closing
 from typing import Any
 
 import httpx
 import pytest
 
-from service.config import HttpSettings
+from service.config import MOST_BATCH, HttpSettings
+from service.errors import BadInput
 from service.http.address import bind, host_name
+from service.http.guard import _local_address
 from service.http.rate import Buckets
 
 from .door import (
@@ -109,7 +112,7 @@ def test_a_page_of_another_site_cannot_even_use_up_our_rate() -> None:
 
 
 def test_a_configured_site_gets_its_preflight_answered_and_no_other_does() -> None:
-    http = settings(allowed_origins=["https://ops.example"])
+    http = settings(allowed_origins=["https://OPS.example/"])
     asked = {"access-control-request-method": "POST", "access-control-request-headers": "authorization"}
     for origin, allowed in (("https://ops.example", "https://ops.example"), ("https://evil.example", None)):
         answer = ask(
@@ -118,6 +121,21 @@ def test_a_configured_site_gets_its_preflight_answered_and_no_other_does() -> No
         assert answer.headers.get("access-control-allow-origin") == allowed
     answer = ask("GET", "/api/state", headers={"origin": "https://ops.example"})
     assert "access-control-allow-origin" not in answer.headers
+
+
+def test_the_address_of_ipv4_is_ours_also_on_a_socket_for_both() -> None:
+    for server, ours in (
+        ("::ffff:192.0.2.7", "192.0.2.7"),
+        ("FE80::1%eth0", "fe80::1"),
+        ("192.0.2.7", "192.0.2.7"),
+    ):
+        assert _local_address({"server": (server, 8080)}) == ours
+    assert _local_address({}) is None
+
+
+def test_a_port_that_another_has_taken_is_told_before_anything_starts() -> None:
+    with closing(bind("127.0.0.1", 0)) as first, pytest.raises(BadInput, match="choose another with --http"):
+        bind("127.0.0.1", first.getsockname()[1])
 
 
 def test_a_host_header_is_read_as_browsers_write_it() -> None:
@@ -261,6 +279,16 @@ def test_a_bucket_lets_its_rate_through_and_no_more() -> None:
     passed = sum(buckets.take("a", 10.0, 1.0) == 0.0 for _ in range(30))
     assert passed == 10
     assert buckets.take("a", 10.0, 0.5) > 0.0  # a clock that goes back fills nothing
+
+
+def test_a_batch_of_any_length_is_refused_before_all_of_it_is_checked() -> None:
+    many, run = [{**FRAME, "id": "x"}] * MOST_BATCH, FakeRun()
+    wrong: list[Any] = [{}] * 5
+    http = settings(max_body_bytes=1 << 24)
+    answer = ask("POST", "/api/reports", json=[*many, *wrong], http=http, run=run)
+    assert answer.status_code == 422
+    assert f"at most {MOST_BATCH} items" in answer.text
+    assert run.reports == []
 
 
 def test_a_batch_larger_than_the_bucket_passes_once_and_is_paid_back() -> None:

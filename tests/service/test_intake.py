@@ -226,3 +226,60 @@ def test_who_sent_what_broke_the_intake_hears_of_it_and_the_next_report_is_taken
         asyncio.run(intake.submit(ago(intake, "a", 1.0)))
     intake.told = told
     assert asyncio.run(intake.submit(ago(intake, "b", 2.0))).status == "accepted"
+
+
+# ---- what one report must not cost the others
+
+
+class Faulty:
+    """A sensor that cannot work some reports out."""
+
+    def __init__(self, sensor: Sensor, *faults: Exception) -> None:
+        self._sensor, self._faults = sensor, dict(zip("xyz", faults, strict=False))
+
+    def footprint(self, pose: Pose) -> Any:
+        return self._sensor.footprint(pose)
+
+    def read(self, pose: Pose, report: Report) -> Any:
+        if report.id in self._faults:
+            raise self._faults[report.id]
+        return self._sensor.read(pose, report)
+
+
+def test_a_report_that_cannot_be_worked_out_is_refused_alone(make: Callable[..., Intake]) -> None:
+    intake = make()
+    faults = (ZeroDivisionError("division by zero"), IndexError("axis 0"), ValueError("NaN"))
+    intake.sensor = Faulty(intake.sensor, *faults)  # type: ignore[arg-type]
+    reports = [frame("x"), frame("a", hit=True), frame("y"), frame("z")]
+    receipts = {each.id: each for each in asyncio.run(intake.submit_all(reports))}
+    assert [receipts[name].status for name in "axyz"] == ["accepted", "refused", "refused", "refused"]
+    assert receipts["a"].hits == 1
+    assert "cannot be worked out (ZeroDivisionError: division by zero)" in receipts["x"].reason
+    assert [row.body["report"]["id"] for row in read_rows(intake.journal.path, "report")] == ["a"]
+
+
+def test_after_any_fault_the_same_reports_count_when_they_are_sent_again(
+    make: Callable[..., Intake], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    intake, append_all = make(), Journal.append_all
+
+    async def broken(self: Journal, rows: Any) -> list[bool]:
+        raise RuntimeError("unexpected")
+
+    monkeypatch.setattr(Journal, "append_all", broken)
+    with pytest.raises(RuntimeError, match="unexpected"):
+        asyncio.run(intake.submit(frame("a", hit=True)))
+    monkeypatch.setattr(Journal, "append_all", append_all)
+    receipt = asyncio.run(intake.submit(frame("a", hit=True)))
+    assert (receipt.status, receipt.hits) == ("accepted", 1)
+
+
+def test_one_batch_does_not_pass_the_limit_of_what_waits(
+    make: Callable[..., Intake], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.evidence.intake.MOST_WAITING", 3)
+    intake = make()
+    old = Report(id="old", captured_at=1.0)
+    receipts = asyncio.run(intake.submit_all([old, *(frame(f"{n}") for n in range(5))]))
+    assert [each.status for each in receipts] == ["refused", *["accepted"] * 3, *["refused"] * 2]
+    assert "more slowly" in receipts[-1].reason

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import signal
 import sqlite3
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from service.errors import BadInput
-from service.journal import Duplicate, Journal, read_meta, read_rows
+from service.journal import Duplicate, Journal, read_last, read_meta, read_rows
 
 
 def filled(path: Path, rows: int) -> Path:
@@ -235,3 +236,82 @@ def test_a_write_that_fails_is_told_to_the_writer(tmp_path: Path) -> None:
     with pytest.raises(sqlite3.Error, match="no such table"):
         asyncio.run(write())
     journal.close()
+
+
+def test_a_run_is_flown_by_one_service_and_read_by_any(tmp_path: Path) -> None:
+    path = filled(tmp_path / "j.sqlite", 3)
+    journal = Journal(path)
+    with pytest.raises(BadInput, match="this run is being flown by another service"):
+        Journal(path)
+    assert read_meta(path, "settings") == {"a": 1}
+    assert len(list(read_rows(path))) == 3
+    journal.close()
+    Journal(path).close()
+
+
+def test_a_journal_that_was_refused_is_not_kept_locked(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    path.write_text("not a database" * 100)
+    for _ in range(2):
+        with pytest.raises(BadInput, match="cannot be opened"):
+            Journal(path)
+
+
+def test_a_clash_of_row_numbers_is_a_failure_and_no_duplicate(tmp_path: Path) -> None:
+    path = filled(tmp_path / "j.sqlite", 3)
+    journal = Journal(path)
+    with sqlite3.connect(path) as database:
+        database.execute("INSERT INTO events VALUES (4, 0.0, 'look', 'theirs', '{}', 0)")
+
+    async def write(key: str | None) -> None:
+        await journal.append(0.0, "report", {}, key=key)
+
+    for key in ("mine", None):
+        with pytest.raises(sqlite3.IntegrityError, match=r"events\.seq"):
+            asyncio.run(write(key))
+    assert isinstance(journal.failed, sqlite3.IntegrityError)
+    journal.close()
+
+
+def test_a_failure_that_was_told_is_not_logged_as_forgotten(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    journal = Journal(tmp_path / "j.sqlite")
+    with sqlite3.connect(tmp_path / "j.sqlite") as database:
+        database.execute("DROP TABLE events")
+
+    async def write() -> None:
+        told = ""
+        try:
+            await journal.append_all([(0.0, "report", "a", "{}")])
+        except sqlite3.Error as error:  # not pytest.raises: it would keep the frames, and so the futures
+            told = str(error)
+        assert "no such table" in told
+        journal.failed = None
+        gc.collect()
+
+    asyncio.run(write())
+    journal.close()
+    gc.collect()
+    assert "never retrieved" not in caplog.text
+
+
+def test_what_is_no_json_is_refused_also_among_the_last_rows(tmp_path: Path) -> None:
+    path = filled(tmp_path / "j.sqlite", 3)
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE events SET body = '{' WHERE seq = 3")
+    with pytest.raises(BadInput, match="the journal cannot be read"):
+        read_last(path, "look", 2)
+
+
+def test_a_journal_that_may_not_be_read_is_refused_in_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = filled(tmp_path / "j.sqlite", 3)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise sqlite3.OperationalError("unable to open database file")
+
+    monkeypatch.setattr(sqlite3, "connect", refuse)
+    with pytest.raises(BadInput, match="the journal cannot be read"):
+        list(read_rows(path))

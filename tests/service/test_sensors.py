@@ -6,9 +6,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from service.area import build_grid, read_area
+from service.camera import Looks
 from service.camera.sensor import CameraSensor
 from service.config import Settings, read_settings
 from service.errors import BadInput
@@ -51,6 +53,7 @@ def test_every_profile_has_a_sensor_and_a_field_of_view(tmp_path: Path) -> None:
         ({"max_range_m": 50.0}, "tilt the camera down"),
         ({"target_size_m": 0.1}, "fly lower or take a longer lens"),
         ({"cell_m": 90.0}, "smaller cells"),
+        ({"min_p_tp": 0.95}, "sensor.min_p_tp = 0.95 is above sensor.p_tp = 0.9"),
         ({"terrain_file": "no-such.tif"}, "no such height model"),
         ({"calibration_file": "no-such.csv"}, "no-such.csv"),
     ],
@@ -61,3 +64,14 @@ def test_a_camera_that_cannot_be_is_told_before_anything_starts(
     grid = build_grid(read_area(write_area(tmp_path)), changed.get("cell_m", 20.0))
     with pytest.raises(BadInput, match=words):
         make_sensor(camera(**changed), grid)
+
+
+def test_a_cell_size_of_a_camera_that_sees_nothing_well_enough_is_refused_in_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(BadInput, match=r"sensor\.min_p_tp = 0\.95 is above"):
+        cell_size(camera(min_p_tp=0.95))
+    nothing = Looks(np.empty((0, 2), dtype=np.int64), np.empty(0), np.empty(0))
+    monkeypatch.setattr("service.evidence.sensors.look_at_cells", lambda *_, **__: nothing)
+    with pytest.raises(BadInput, match="nothing is in view from 60 m well enough to count"):
+        cell_size(camera())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pyproj
@@ -178,8 +179,37 @@ def test_a_drawn_footprint_covers_what_it_covers() -> None:
     assert got == pytest.approx(
         {(10, 10): 1.0, (10, 11): 1.0, (10, 12): 0.5, (11, 10): 1.0, (11, 11): 1.0, (11, 12): 0.5}, abs=1e-6
     )
-    with pytest.raises(Unreadable, match="not a polygon"):
-        SENSOR.read(pose(15, 15), report(footprint=[[47.0, 8.0], [47.1, 8.1], [47.2, 8.2]]))
+    for crossed in ([[9, 9], [10, 10], [11, 11]], [[9, 9], [11, 11], [9, 11], [11, 9]]):
+        with pytest.raises(Unreadable, match="not a polygon"):
+            SENSOR.read(pose(15, 15), report(footprint=FRAME.to_latlon(crossed).tolist()))
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [[-90, -180], [-90, 180], [90, 180], [90, -180]],
+        [[47.0, 8.0], [47.1, 8.1], [47.2, -171.7]],
+        [[-47.05, -171.7], [47.05, 8.3], [47.05, 8.301]],
+    ],
+)
+def test_a_drawn_footprint_that_no_camera_sees_is_refused_at_once(corners: list[list[float]]) -> None:
+    begun = time.perf_counter()
+    with pytest.raises(Unreadable, match=r"more than 3000 m from the camera, 10 times sensor\.max_range_m"):
+        SENSOR.read(pose(15, 15), report(footprint=corners))
+    assert time.perf_counter() - begun < 1.0
+
+
+def test_a_drawn_footprint_may_lie_across_the_date_line() -> None:
+    frame = GridFrame(-17.0, 180.0, 0.0, FRAME.cell_m, 30, 30, -400.0, 400.0)
+    there = CameraSensor(**{**vars(SENSOR), "frame": frame})
+    corners = frame.to_latlon([[9.5, 9.5], [9.5, 20.5], [11.5, 20.5], [11.5, 9.5]])
+    assert {-1.0, 1.0} == set(np.sign(corners[:, 1]).tolist())
+    lat, lon = frame.to_latlon([[15, 15]])[0].tolist()
+    begun = time.perf_counter()
+    seen = there.read(Pose(lat, lon, 60.0, 0.0, 0.0), report(footprint=corners.tolist())).footprint
+    assert time.perf_counter() - begun < 1.0
+    assert len(seen.cells) == 22
+    assert seen.covered == pytest.approx(np.ones(22), abs=1e-6)
 
 
 def test_the_planner_plans_with_the_best_row_of_a_pass() -> None:

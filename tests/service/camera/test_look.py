@@ -23,6 +23,7 @@ from service.camera import (
     rotation,
     sight_from,
 )
+from service.camera.optics import Floats
 from service.errors import BadInput
 
 CELL = 20.0
@@ -158,3 +159,22 @@ def test_a_height_model_is_laid_under_the_grid_relative_to_the_launch(tmp_path: 
         read_terrain(file, FRAME, (10.0, 10.0), 300.0)
     with pytest.raises(BadInput, match="no such height model"):
         read_terrain(tmp_path / "none.tif", FRAME, launch, 300.0)
+
+
+def test_a_camera_at_the_horizon_looks_no_farther_than_what_it_sees_steeply_enough() -> None:
+    class Counting(Flat):
+        most = 0
+
+        def height_at(self, points: Floats) -> Floats:
+            type(self).most = max(self.most, len(points))
+            return super().height_at(points)
+
+    ground = Counting()
+    limits = {"max_range_m": 4000.0, "min_grazing_deg": 10.0}
+    far = look_at_cells(at(-20.0), ground, FRAME, DETECT, bounded=False, **limits)  # type: ignore[arg-type]
+    reach = 60.0 / math.sin(math.radians(10.0))
+    assert ground.most <= 36 * (reach / CELL + 3) * (2 * reach / CELL + 3)
+    near = look_at_cells(
+        at(-20.0), Flat(), FRAME, DETECT, bounded=False, max_range_m=reach, min_grazing_deg=10.0
+    )
+    assert by_cell(far) == by_cell(near)

@@ -153,8 +153,9 @@ class Journal:
         if not entries:
             return []
         self._enqueue(entries)
-        # the outcomes come in their order; gathered, so that a failure that nobody asks for is not logged as forgotten
-        await asyncio.gather(asyncio.wrap_future(entries[-1].done), return_exceptions=True)
+        last = asyncio.wrap_future(entries[-1].done)  # the outcomes come in their order
+        await asyncio.wait([last])  # which leaves it to the writer when we are cancelled
+        last.exception()  # asked for, so that it is not logged as forgotten
         failures = [entry.done.exception() for entry in entries]
         for failure in failures:
             if failure is not None and not isinstance(failure, Duplicate):

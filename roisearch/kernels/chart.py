@@ -34,9 +34,8 @@ class Chart(NamedTuple):
     uint8 [cells], bit h set when move h is possible; 0 for a cell that cannot be entered. offsets: int [4,
     k, 2], p_tp: float [k], what is seen by heading. spread: int [n, 2], share: float [n]: a cell's mass m
     adds share * m to the worth of the cell `spread` away. stamp: int [blocks], number of the simulation
-    that last kept a block; log: int [most], kept blocks; old: float [most, 2, 64], their mass and worth;
-    old_peak: float [most]; counters: int [4], number of the simulation, kept blocks, state of the random
-    numbers (unused here), reserved.
+    that last kept a block; log: int [blocks], kept blocks; old: float [blocks, 2, 64], their mass and worth;
+    old_peak: float [blocks]; counters: int [2], number of the simulation, kept blocks.
     """
 
     rows: int
@@ -148,12 +147,6 @@ def begin(chart: Chart) -> None:
     chart.counters[KEPT] = 0
     copy_table(chart.tops, chart.old_tops)
     copy_table(chart.levels, chart.old_levels)
-
-
-@kernel
-def is_full(chart: Chart) -> bool:
-    """Whether there may be no room to keep the blocks of one more look."""
-    return bool(chart.log.size < chart.stamp.size and chart.counters[KEPT] + 64 > chart.log.size)
 
 
 @kernel

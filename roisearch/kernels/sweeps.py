@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.kernels.chart import AREA, BLOCK, Chart, Floats, Ints, gain_from, is_full, look
+from roisearch.kernels.chart import AREA, BLOCK, Chart, Floats, Ints, gain_from, look
 from roisearch.kernels.compiled import light_kernel as kernel
 
 ANYWHERE = -1
@@ -385,7 +385,7 @@ def sweep(
     area = 0.0
     steps = 0
     limit = np.inf
-    while steps < most and not is_full(chart):
+    while steps < most:
         if chart.is_open and steps % HOLD == 0:
             limit = far_limit(row, col, chart, near, home, region, floor)
         move = next_move(row, col, heading, chart, near, labels, home, region, floor, limit, wave)

@@ -15,7 +15,7 @@ from roisearch.fov import HEADINGS, MOVES, FieldOfView, heading_index
 from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
-from roisearch.planners.base import Progress, Scene, World, remark_on
+from roisearch.planners.base import Progress, Scene, World, any_move, remark_on
 from roisearch.planners.looks import Watch
 from roisearch.planners.sweep_settings import SweepSettings
 from roisearch.planners.warm import warm_up
@@ -75,7 +75,7 @@ class SweepPlanner:
         spread, share = spread_of(fov)
         blocks = (-(-rows // charts.BLOCK), -(-cols // charts.BLOCK))
         areas = (-(-blocks[0] // charts.BLOCK), -(-blocks[1] // charts.BLOCK))
-        kept = min(blocks[0] * blocks[1], 8192)
+        kept = blocks[0] * blocks[1]  # a simulation may change every block; memory is taken only when it does
         mass = np.zeros(cells)
         tops, levels = np.zeros(areas), np.zeros((charts.LEVELS, 2))
         self._chart = charts.Chart(
@@ -94,13 +94,13 @@ class SweepPlanner:
             share=share,
             is_point=fov.is_point,
             is_open=scene.ground.is_open,
-            stamp=np.zeros(blocks[0] * blocks[1], dtype=np.int64),
+            stamp=np.zeros(kept, dtype=np.int64),
             log=np.zeros(kept, dtype=np.int64),
             old=np.zeros((kept, 2, charts.BLOCK**2)),
             old_peak=np.zeros(kept),
             old_tops=np.zeros_like(tops),
             old_levels=np.zeros_like(levels),
-            counters=np.zeros(4, dtype=np.int64),
+            counters=np.zeros(2, dtype=np.int64),
         )
         room = [np.zeros(0 if scene.ground.is_open else cells, dtype=np.int64) for _ in range(4)]
         self._wave = Wave(room[0], room[1], room[2], room[3], np.zeros(1, dtype=np.int64))
@@ -143,7 +143,7 @@ class SweepPlanner:
             spread=s.spread,
             spacing=s.spacing,
             overhead=s.overhead,
-            looks_per_halving=1.0 if p >= 0.5 and p == 1.0 else float(np.log(2.0) / -np.log1p(-p)),
+            looks_per_halving=1.0 if p == 1.0 else float(np.log(2.0) / -np.log1p(-p)),
             looks_per_step=max(1.0, fresh_per_step(self._fov)),
         )
 
@@ -180,8 +180,9 @@ class SweepPlanner:
         tree, chart, rules = self._tree, self._chart, self._rules
         row, col, heading = pose
         labels, home, wave = self._labels, self._home, self._wave
-        if tree.mark[plans.LENGTH] - tree.mark[plans.NOW] < self.settings.horizon - 512:
-            plans.extend(row, col, heading, chart, tree, rules, labels, home, self.settings.horizon, wave)
+        horizon = self.settings.horizon
+        if tree.mark[plans.LENGTH] - tree.mark[plans.NOW] < horizon - min(512, horizon // 4):
+            plans.extend(row, col, heading, chart, tree, rules, labels, home, horizon, wave)
             self._resume()
         plans.settle_root(row, col, chart, tree, rules, labels, home)
         done = 0
@@ -339,10 +340,7 @@ class SweepPlanner:
         now, length = int(tree.mark[plans.NOW]), int(tree.mark[plans.LENGTH])
         unreachable = scene.unreachable(belief, belief.sums_of(scene.forest))
         if length == now:  # nothing left anywhere: any move will do
-            legal = int(self._chart.legal[cell[0] * cols + cell[1]])
-            move = (legal & -legal).bit_length() - 1
-            there = (cell[0] + (move == 2) - (move == 0), cell[1] + (move == 1) - (move == 3))
-            return Decision((there,), HEADINGS[move], 0.0, Effort(iterations, time.perf_counter() - began))
+            return any_move(scene, SearchState(cell, HEADINGS[self._pose[2]]), began, unreachable)
         ahead = tree.path[now : min(length, now + self.settings.path)].tolist()
         path = tuple(divmod(flat, cols) for flat in ahead)
         region = int(tree.action[now])

@@ -227,6 +227,43 @@ def test_a_second_look_at_a_cell_outside_the_plan_is_taken_in() -> None:
     assert planner.plan(belief, state, rng).path[0] == (20, 19)
 
 
+def test_the_shortest_plan_never_runs_out() -> None:
+    belief, rng = Belief(np.ones((20, 20))), np.random.default_rng(0)
+    planner, state = (
+        SweepPlanner(SweepSettings(iterations=1, horizon=64), fov=FOVS["point"]),
+        SearchState((0, 0)),
+    )
+    for _ in range(300):
+        decision = planner.plan(belief, state, rng)
+        assert decision.value < 0.0, "a move without a plan"
+        state = after(state, decision.path[0])
+        belief.observe([state.cell], False, 0.9, 1.0)
+
+
+def test_what_lies_where_nobody_can_look_is_told_also_when_nothing_else_is_left() -> None:
+    flyable = np.ones((6, 9), dtype=bool)
+    flyable[:, 4] = False
+    prior = np.ones((6, 9))
+    prior[:, 4] = 0.0
+    belief = Belief(prior)
+    belief.observe(np.argwhere(np.indices((6, 9))[1] < 4), False, 1.0, 0.9)
+    planner = SweepPlanner(QUICK, fov=FOVS["point"], flyable=flyable)
+    decision = planner.plan(belief, SearchState((0, 0)), np.random.default_rng(0))
+    assert decision.unreachable == pytest.approx(1.0)
+    assert "cannot look" in decision.remark
+
+
+def test_a_large_map_with_a_large_view_is_planned_for() -> None:
+    """Every block of a map may be changed in one simulation, more of them than any fixed room holds."""
+    prior = hill((1000, 600), (500, 300), 200.0)
+    fov = FieldOfView.from_mask(np.ones((41, 41)))
+    planner = SweepPlanner(SweepSettings(iterations=0, horizon=1500), fov=fov)
+    belief = Belief(prior)
+    before = belief.weights.copy()
+    planner.plan(belief, SearchState((500, 300)), np.random.default_rng(0))
+    assert (planner._chart.mass == before).all()
+
+
 def test_alternatives_say_what_was_thought_of_each_region() -> None:
     belief = Belief(hill((60, 60), (50, 10), 3.0) + 0.6 * hill((60, 60), (10, 50), 3.0))
     planner = SweepPlanner(SweepSettings(iterations=200, horizon=600), fov=FOVS["point"])

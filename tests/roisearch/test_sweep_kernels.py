@@ -21,7 +21,7 @@ FOVS = {"point": FieldOfView.point(), "donut": FieldOfView.donut(), "wide": Fiel
 def planner_on(
     weights: np.ndarray, name: str, at: tuple[int, int], flyable: np.ndarray | None = None
 ) -> tuple[SweepPlanner, np.ndarray]:
-    """A planner that has planned once from `at`, with two regions, and the probabilities it saw."""
+    """A planner that has planned once from `at`, with two regions, and the probability of all that can be seen."""
     labels = np.ones(weights.shape, dtype=np.int32)
     labels[:, weights.shape[1] // 2 :] = 2
     regions = Regions(labels, 2, np.zeros((2, 2)), np.zeros((2, 2), dtype=np.int64))
@@ -30,7 +30,8 @@ def planner_on(
     )
     belief = Belief(weights)
     planner.plan(belief, SearchState(at), np.random.default_rng(0))
-    return planner, belief.probability()
+    assert planner._scene is not None
+    return planner, np.where(planner._scene.part.viewable, belief.probability(), 0.0)
 
 
 def naive_gain(mass: np.ndarray, fov: FieldOfView, cell: tuple[int, int], heading: int) -> float:

@@ -259,7 +259,7 @@ class Service:
                 "resumed: %d reports of the earlier run, POS %.1f %%", replayed, 100 * self.search.record.pos
             )
         if (last := last_transition(journal.path)) is not None and last["to"] == State.RETURNING:
-            mission.was_returning = last
+            mission.departure.was_returning = last
         self.view.mission, self.view.intake = mission, intake
         return mission
 
@@ -298,10 +298,8 @@ class Service:
                 log.warning("%s again: leaving the aircraft to its autopilot", name)
                 flying.cancel()
             else:
-                ours = (
-                    mission.flight.began and mission.state != State.YIELDED
-                )  # a pilot's aircraft is not taken
-                order = "return" if ours else "abort"
+                pilots = mission.state == State.YIELDED  # it is not taken from the pilot
+                order = "return" if mission.flight.began and not pilots else "abort"
                 log.warning("%s: %s (once more to leave the aircraft to its autopilot)", name, order)
                 orders.add(asyncio.create_task(mission.order(order)))
 

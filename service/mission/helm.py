@@ -22,6 +22,7 @@ from service.mission.limits import Lasting, PositionTrust, Progress, wind_object
 from service.mission.navigator import Cell
 
 log = logging.getLogger("roisearch")
+TICK_S, RETRY_S = 0.1, 1.0  # how often a mission looks at things, and after what it tries again
 LEAST_PATIENCE_WALL_S = 1.5
 WINDY_S = 5.0
 STRAYED_S = 2.0

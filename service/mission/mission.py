@@ -15,7 +15,7 @@ import logging
 import math
 import sqlite3
 import time
-from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 
 from roisearch import Decision
 from service.clock import Clock
@@ -25,9 +25,10 @@ from service.evidence.observe import Observation
 from service.evidence.suspects import Found
 from service.journal import Journal
 from service.mavlink import LinkError, Vehicle
+from service.mission.departure import Departure
 from service.mission.finding import Finding
 from service.mission.flight import Flight, LatLon
-from service.mission.helm import Helm
+from service.mission.helm import RETRY_S, TICK_S, Helm
 from service.mission.holds import Holds
 from service.mission.homeward import Homeward
 from service.mission.navigator import Cell, Navigator
@@ -37,8 +38,6 @@ from service.search import Search
 from service.view.reasons import Reason
 
 log = logging.getLogger("roisearch")
-TICK_S = 0.1
-RETRY_S = 1.0
 LEAVING_S = 5.0
 HOME_AGAIN_S = 5.0  # after which a return to launch that is not flown is ordered again
 _CRITICAL = 2  # MAV_SEVERITY
@@ -76,8 +75,6 @@ class Mission:
         self.why_stopped = ""
         self.searched = False  # the search ended because there was nothing more to gain, not by an order
         self.resend = False  # the last waypoint or stop may have been lost: `Watch` says so
-        self.was_returning: Mapping[str, str] | None = None
-        """The last transition of the run that this one goes on with, when it was on its way home."""
         self.autopilot_returns = False  # the return to launch was ordered: it flies by itself now, or soon
         self._hovering = False  # over a suspect, for another look
         fly = settings.flight
@@ -88,6 +85,7 @@ class Mission:
         self._changed = asyncio.Event()
         self._wake = asyncio.Event()
         self._group = asyncio.TaskGroup()
+        self.departure = Departure(self, write=self._write)
         self.holds = Holds(self, tick=self._tick, energy_low=self._energy_low)
         self.finding = Finding(self, write=self._write, tick=self._tick, energy_low=self._energy_low)
         self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
@@ -206,85 +204,13 @@ class Mission:
             jobs = (self.watch.run(), self._guard(), self._keep_track())
             watchers = [group.create_task(job) for job in jobs]
             try:
-                await self._get_ready()
+                await self.departure.get_ready()
                 while self.state not in FINAL:
                     await self._phase()
             finally:
                 self._drop_thought()
                 for watcher in watchers:
                     watcher.cancel()
-
-    async def _get_ready(self) -> None:
-        patience = self.settings.link.connect_timeout_s
-        await self.vehicle.connect(patience)
-        await self.vehicle.wait_until(lambda t: t.landed_state != "undefined", patience)
-        self.helm.begin()
-        await self.happen(Event.LINKED, f"{self.vehicle.telemetry.autopilot} is ready")
-        if self.state != State.READY:  # aborted meanwhile
-            return
-        if self.was_returning is not None:
-            await self._go_on_home(self.was_returning)
-        elif self.may_take_off and self.helm.on_ground():
-            await self._take_off()
-        else:
-            log.info("take off and select the guided mode: the search starts when the aircraft hovers in it")
-            if await self._hovers():
-                await self.happen(Event.AIRBORNE, "in the air, in the guided mode")
-
-    async def _go_on_home(self, last: Mapping[str, str]) -> None:
-        """The run that this one goes on with was on its way home. So is this one, if the aircraft is ours still, or
-        down; while the autopilot brings it home, or a pilot has it, that is waited for."""
-        log.info("it was on its way home: waiting until the aircraft is down, or hovers in the guided mode")
-        self.found = self.search.found()
-        self.why_stopped = "" if self.found else last["reason"]
-        self.searched = last["event"] in (Event.SEARCHED, Event.ENERGY_LOW)
-        while self.state == State.READY and not self.helm.on_ground() and not self.helm.hovering():
-            await self.clock.sleep(TICK_S)
-        if self.state == State.READY and (self.helm.on_ground() or await self._hovers()):
-            await self.happen(Event.RETURN, "it was on its way home")
-
-    async def _hovers(self) -> bool:
-        """Wait until the aircraft hovers in the guided mode, and take control; False when the state changed first."""
-        while self.state == State.READY and not self.helm.hovering():
-            await self.clock.sleep(TICK_S)
-        if self.state == State.READY:
-            await self.vehicle.enter_guided()
-            self.helm.begin()  # home is where it was armed
-        return self.state == State.READY
-
-    async def _take_off(self) -> None:
-        height = self.settings.flight.altitude_m
-        await self._unless_changed(self.vehicle.wait_ready(self.settings.link.connect_timeout_s))
-        if not await self.happen(Event.CLIMB, f"taking off to {height:.0f} m"):
-            return
-        await self._write("command", {"command": "take off", "height_m": height})
-        self.flight.began = self.clock.now()
-        vehicle = self.vehicle
-        try:
-            for step in (vehicle.enter_guided, vehicle.arm, functools.partial(vehicle.take_off, height)):
-                if self.state != State.TAKEOFF or not await self._unless_changed(step()):
-                    return
-            self.helm.begin()  # home is where it was armed
-            await self.happen(Event.AIRBORNE, f"at {height:.0f} m")
-        except LinkError as error:
-            await self.clock.sleep(RETRY_S)  # what the pilot did is told by an event of its own
-            if self.state == State.TAKEOFF:
-                raise
-            log.warning("%s", error)
-
-    async def _unless_changed(self, action: Coroutine[object, object, object]) -> bool:
-        """Carry out what takes long, as long as the state lasts; False when that changed, and it was broken off."""
-        state, doing = self.state, asyncio.create_task(action)
-        try:
-            while not doing.done() and self.state == state:
-                await asyncio.wait([doing], timeout=TICK_S / self.clock.speedup)
-            if doing.done():
-                doing.result()
-            return self.state == state
-        finally:
-            doing.cancel()
-            with contextlib.suppress(asyncio.CancelledError, LinkError):
-                await doing
 
     async def _phase(self) -> None:
         """Do what the state asks for until the state changes."""

@@ -46,6 +46,7 @@ class Event(StrEnum):
     RETURN = "return"
     LANDED = "landed"
     ABORT = "abort"
+    HOMEWARD = "homeward"  # the run that this one goes on with was on its way home
 
 
 FLYING = (State.SEARCHING, State.CONFIRMING)
@@ -57,7 +58,7 @@ TABLE: dict[tuple[State, Event], State] = {
     (State.WAITING, Event.LINKED): State.READY,
     (State.READY, Event.CLIMB): State.TAKEOFF,
     (State.READY, Event.AIRBORNE): State.SEARCHING,
-    (State.READY, Event.RETURN): State.RETURNING,
+    (State.READY, Event.HOMEWARD): State.RETURNING,
     (State.TAKEOFF, Event.AIRBORNE): State.SEARCHING,
     (State.TAKEOFF, Event.PILOT): State.YIELDED,
     (State.TAKEOFF, Event.RETURN): State.RETURNING,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
 from service.config import Settings
+from service.mission.departure import Departure
 from service.mission.mission import Mission
 from service.mission.states import Event, State, next_state
 
@@ -26,7 +27,9 @@ class Preparing:
         self.at, self.event = at, event
         self.settings = Settings()
         self.state, self.found, self.why_stopped, self.searched = State.WAITING, None, "", False
-        self.may_take_off, self.was_returning = True, was_returning
+        self.may_take_off = True
+        self.departure = Departure(cast(Mission, self), write=self._write)
+        self.departure.was_returning = was_returning
         self.clock = SimpleNamespace(now=lambda: 1.0, speedup=100.0, sleep=lambda s: asyncio.sleep(s / 100.0))
         self.flight = SimpleNamespace(began=0.0)
         self.down, self.hovers = True, False
@@ -57,12 +60,9 @@ class Preparing:
     async def _write(self, kind: str, body: object) -> None:
         pass
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(Mission, name).__get__(self)
-
     def readied(self) -> State:
         """The state after getting ready."""
-        asyncio.run(asyncio.wait_for(Mission._get_ready(cast(Mission, self)), 5.0))
+        asyncio.run(asyncio.wait_for(self.departure.get_ready(), 5.0))
         return self.state
 
 
@@ -107,8 +107,13 @@ def test_a_run_that_was_on_its_way_home_goes_on_home_or_waits_for_who_flies(ours
         mission.down = True
 
     async def both() -> None:
-        await asyncio.gather(Mission._get_ready(cast(Mission, mission)), land_later())
+        await asyncio.gather(mission.departure.get_ready(), land_later())
 
     asyncio.run(both())
     assert mission.state == State.RETURNING
     assert mission.did == (["connected", "guided"] if ours else ["connected"])
+
+
+def test_an_order_to_return_changes_nothing_before_the_flight() -> None:
+    """Whoever has the aircraft then keeps it."""
+    assert next_state(State.READY, Event.RETURN) == State.READY

@@ -29,15 +29,19 @@ _intrinsic: Any = intrinsic
 
 
 class Parcel:
-    """What was packed; it must be kept as long as its address is used.
+    """What was packed; it must be kept as long as its address is used. A copy of it is packed anew.
 
     Attributes:
         address: of the record.
     """
 
-    def __init__(self, record: NDArray[Any], things: dict[str, Any]) -> None:
-        self._kept = (record, things)
-        self.address: int = record.ctypes.data
+    def __init__(self, layout: Layout, things: dict[str, Any]) -> None:
+        self._layout, self._things = layout, things
+        self._record = layout.record_of(things)
+        self.address: int = self._record.ctypes.data
+
+    def __reduce__(self) -> tuple[type[Parcel], tuple[Layout, dict[str, Any]]]:
+        return Parcel, (self._layout, self._things)
 
 
 class Layout:
@@ -58,7 +62,11 @@ class Layout:
         )
 
     def pack(self, **things: Any) -> Parcel:
-        """Pack an array or a number for every name.
+        """Pack an array or a number for every name; raises ValueError like `record_of`."""
+        return Parcel(self, things)
+
+    def record_of(self, things: dict[str, Any]) -> NDArray[Any]:
+        """The record, structured [1], in which an array is its address and its shape.
 
         Raises:
             ValueError: when a name is missing or unknown, or an array is not of its type, of its number of
@@ -79,7 +87,7 @@ class Layout:
                     f"not {thing.dtype} of shape {thing.shape}"
                 )
             record[name] = (thing.ctypes.data, *thing.shape)
-        return Parcel(record, things)
+        return record
 
     def opener(self) -> Callable[[int], Any]:
         """A function, in kernels only, from the address of a parcel to its record."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
+from roisearch import Belief, FieldOfView, SearchState, make_planner
 from roisearch.kernels.compiled import kernel
 from roisearch.kernels.handover import Layout, array
 
@@ -57,3 +61,25 @@ def test_arrays_and_numbers_arrive_and_arrays_are_not_copied() -> None:
 def test_what_a_kernel_would_misread_is_refused(name: str, thing: Any, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         LAYOUT.pack(**{**things(), name: thing})
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))])
+def test_a_copy_has_addresses_of_its_own(copied: Callable[[Any], Any]) -> None:
+    """A researcher copies beliefs and planners, also into other processes."""
+    planner = make_planner("puct-regions-lite", fov=FieldOfView.point(), preset="paper", commit="never")
+    belief = Belief(np.random.default_rng(0).random((12, 15)) ** 4)
+    rng, state = np.random.default_rng(1), SearchState((3, 3))
+    planner.plan(belief, state, rng)
+    sums = belief.sums_of(planner._scene.forest)  # type: ignore[attr-defined]
+    before = sums.sums.copy()
+    pair = copied((planner, belief, rng))
+    for _ in range(20):
+        decision = pair[0].plan(pair[1], state, pair[2])
+        pair[1].observe([decision.path[0]], False, 0.9, 0.9)
+    assert (sums.sums == before).all()
+    for _ in range(20):
+        decision = planner.plan(belief, state, rng)
+        belief.observe([decision.path[0]], False, 0.9, 0.9)
+    again = pair[1].sums_of(pair[0]._scene.forest)
+    assert (again.sums == sums.sums).all()
+    assert pair[1].digest() == belief.digest()

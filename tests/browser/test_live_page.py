@@ -199,6 +199,8 @@ def test_a_keyboard_is_enough(watch: Watch, stage: Stage) -> None:
     expect(page.get_by_role("dialog")).to_be_hidden()
     assert focused(page) == "Resume"
     page.keyboard.press("Enter")
+    expect(page.get_by_role("dialog")).to_be_visible()
+    assert focused(page) == "Cancel"  # a key that comes sooner goes to the page behind
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
     searching(watch)

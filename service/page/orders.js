@@ -24,15 +24,19 @@ export function tell(text) {
   clearing = setTimeout(() => say($("toast"), ""), 5000);
 }
 
+/** Ask; every question has a dialog of its own, since a closed dialog's "close" event may come late, after the next
+ * question was opened, and must not answer that one. */
 function sure(command) {
-  const [title, text, yes] = QUESTIONS[command], dialog = $("ask");
-  $("ask-title").textContent = title;
-  $("ask-text").textContent = text;
-  $("ask-yes").textContent = yes;
-  dialog.returnValue = "no";
+  const [title, text, yes] = QUESTIONS[command], dialog = $("ask").content.firstElementChild.cloneNode(true);
+  dialog.querySelector("h2").textContent = title;
+  dialog.querySelector("p").textContent = text;
+  dialog.querySelector(".go").textContent = yes;
+  document.body.append(dialog);
   dialog.showModal();
-  $("ask-no").focus();
-  return new Promise((settle) => dialog.addEventListener("close", () => settle(dialog.returnValue === "yes"), { once: true }));
+  return new Promise((settle) => dialog.addEventListener("close", () => {
+    dialog.remove();
+    settle(dialog.returnValue === "yes");
+  }));
 }
 
 export async function give(command, place = {}) {

@@ -148,6 +148,9 @@ def test_a_rejected_detection_lowers_the_map_there(watch: Watch, stage: Stage) -
     grid = stage.door.get("/api/map").json()
     frame = GridFrame.from_dict(grid["frame"])
     left = np.array(grid["probability"], dtype=float)  # null is nan
+    pose = stage.state()["pose"]
+    row, col = frame.to_cells([(pose["lat"], pose["lon"])])[0].tolist()
+    left[max(0, row - 3) : row + 4, max(0, col - 3) : col + 4] = np.nan  # being watched: no new look there
     row, col = (int(i) for i in np.unravel_index(np.nanargmax(left), left.shape))
     lat, lon = frame.to_latlon([(row, col)])[0].tolist()
     seen = {"lat": lat, "lon": lon, "score": 0.9, "thumbnail": "https://camera.example/1.jpg"}
@@ -209,6 +212,26 @@ def test_a_keyboard_is_enough(watch: Watch, stage: Stage) -> None:
         page.keyboard.press("Tab")
         reached.add(page.evaluate("document.activeElement.id"))
     assert {"map", "layer-belief", "layer-pod", "layer-tiles"} <= reached
+
+
+LATE = """() => window.addEventListener("close", (event) => {
+  if (!event.isTrusted) return;
+  event.stopImmediatePropagation();
+  setTimeout(() => event.target.dispatchEvent(new Event("close")), 1000);
+}, true)"""
+
+
+def test_a_question_that_ends_late_does_not_answer_the_next_one(watch: Watch, stage: Stage) -> None:
+    searching(watch)
+    watch.order("Hold").click()
+    watch.shows("HOLDING")
+    watch.page.evaluate(LATE)  # as on a busy host
+    dialog = watch.page.get_by_role("dialog")
+    watch.order("Return").click()
+    dialog.get_by_role("button", name="Cancel").click()
+    watch.order("Resume").click()
+    dialog.get_by_role("button", name="Resume").click()
+    searching(watch)
 
 
 def test_no_serious_finding_of_axe(watch: Watch, stage: Stage) -> None:

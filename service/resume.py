@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections import deque
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -55,27 +57,42 @@ def retrace(row: Row, search: Search) -> None:
         search.apply(Observation.from_dict(row.body["observation"]))
 
 
+@contextlib.contextmanager
+def _knowing(journal: Path, row: Row) -> Iterator[None]:
+    """Say which row it was that could not be understood."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise BadInput(
+            f"{journal}: row {row.seq} is no {row.kind} that this version knows ({error})"
+        ) from error
+
+
 def replay(
     journal: Path,
     search: Search,
     intake: Intake,
     told: Callable[[float, float], None] = lambda time, pos: None,
 ) -> int:
-    """Apply the journalled observations and verdicts to a fresh search, in their order.
+    """Apply the journalled observations and verdicts to a fresh search, in their order, and take up the passes that
+    were going on: what hovers over a cell has looked at it once, whether or not the service was killed meanwhile.
 
     `told` hears the time of each row and the POS after it. Returns how many reports there were.
     """
     ids = set()
+    recent: deque[Row] = deque()
     for row in read_rows(journal, "report", VERDICT):
-        try:
+        with _knowing(journal, row):
             retrace(row, search)
             if row.kind == "report":
                 ids.add(row.body["report"]["id"])
-        except (KeyError, TypeError, ValueError, IndexError) as error:
-            raise BadInput(
-                f"{journal}: row {row.seq} is no {row.kind} that this version knows ({error})"
-            ) from error
+                recent.append(row)
+                while recent[0].time < row.time - intake.history_s:
+                    recent.popleft()
         told(row.time, search.record.pos)
+    for row in recent:
+        with _knowing(journal, row):
+            intake.recall(row)
     intake.remember(ids)
     intake.accepted = len(ids)
     return len(ids)

@@ -12,6 +12,7 @@ not mind the order. What is older than the telemetry's memory is refused.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 import sqlite3
@@ -27,7 +28,7 @@ from service.evidence.reports import Receipt, Report
 from service.evidence.sensors import Profile
 from service.evidence.verdict import ROW as VERDICT
 from service.evidence.verdict import verdict_on, verdict_row
-from service.journal import Journal
+from service.journal import Journal, Row
 from service.search import Search
 
 log = logging.getLogger("roisearch")
@@ -137,6 +138,20 @@ class Intake:
         while len(self._ids) > MOST_IDS:
             self._ids.popitem(last=False)
 
+    def recall(self, row: Row) -> None:
+        """Take up the passes that a report of an earlier run of the same search belongs to; rows come in their order.
+
+        Raises KeyError, TypeError or ValueError when this is no row of a report.
+        """
+        report = Report.model_validate(row.body["report"])
+        captured = row.body.get("captured", row.time)  # not told by early versions
+        lat, lon, height, heading, pitch, roll = row.body["pose"]
+        with contextlib.suppress(Unreadable):  # the sensor may have been set otherwise since
+            reading = self.sensor.read(Pose(lat, lon, height, heading, captured, pitch, roll), report)
+            if report.usable:
+                observe(self.passes, report.source, captured, reading)
+        self.passes.settle()
+
     async def judge(self, cell: Cell, *, confirmed: bool) -> None:
         """Take in what an operator says about the place around `cell`; raises JournalLost."""
         reliability = self.search.settings.search.reject_reliability
@@ -229,7 +244,8 @@ class Intake:
             if report.usable:
                 observation = observe(self.passes, report.source, each.captured, reading)
             new[report.id] = (each, observation)
-            rows.append((self.clock.now(), "report", f"report {report.id}", _row(report, pose, observation)))
+            body = _row(report, pose, each.captured, observation)
+            rows.append((self.clock.now(), "report", f"report {report.id}", body))
         return rows
 
     def _believe(self, each: _Waiting, observation: Observation | None) -> None:
@@ -299,11 +315,12 @@ class Intake:
         return Pose(own.lat, own.lon, own.height_m, own.heading_deg, captured, pitch, roll)
 
 
-def _row(report: Report, pose: Pose, observation: Observation | None) -> str:
-    """What the journal keeps of a report, as JSON."""
+def _row(report: Report, pose: Pose, captured: float, observation: Observation | None) -> str:
+    """What the journal keeps of a report, as JSON; `captured` is in the service's clock."""
     body = {
         "report": report.model_dump(by_alias=True, exclude_unset=True),
         "pose": [pose.lat, pose.lon, pose.height_m, pose.heading_deg, pose.pitch_deg, pose.roll_deg],
+        "captured": captured,
         "observation": observation.to_dict() if observation else None,
     }
     return json.dumps(body)

@@ -149,6 +149,27 @@ def test_a_verdict_is_evidence_and_is_replayed_to_the_last_bit(tmp_path: Path) -
     assert again.sightings.suspects(probability) == search.sightings.suspects(probability)
 
 
+def test_a_pass_that_a_kill_interrupts_is_one_look(tmp_path: Path) -> None:
+    """Two frames of a hover over one cell, and a service that is killed between them."""
+    search = fresh_search(tmp_path)
+    lat, lon = search.grid.frame.to_latlon([[3, 3]])[0].tolist()
+    pose = {"lat": lat, "lon": lon, "height_m": 30.0, "heading_deg": 0.0}
+
+    def frame(number: int) -> Report:
+        return Report.model_validate({"id": f"r{number}", "captured_at": 1000.0 + number, "pose": pose})
+
+    with intake_for(search, tmp_path / "j.sqlite") as intake:
+        assert asyncio.run(intake.submit(frame(0))).looks == 1
+        assert asyncio.run(intake.submit(frame(1))).looks == 0
+    again = fresh_search(tmp_path)
+    with intake_for(again, tmp_path / "j.sqlite") as intake:
+        replay(tmp_path / "j.sqlite", again, intake)
+        assert asyncio.run(intake.submit(frame(2))).looks == 0
+        away = frame(4).model_copy(update={"pose": None})  # over other ground
+        asyncio.run(intake.submit(away))
+        assert asyncio.run(intake.submit(frame(5))).looks == 1
+
+
 def test_a_verdict_multiplies_the_odds_as_bayes_rule_says(tmp_path: Path) -> None:
     for confirmed, factor in ((False, 0.01 / 0.99), (True, 0.99 / 0.01)):
         search = fresh_search(tmp_path)

@@ -242,8 +242,12 @@ def iterate(
     home: NDArray[np.int32],
     wave: Wave,
     state: NDArray[np.uint64],
+    hold: int,
 ) -> bool:
-    """One iteration; see the module's text. The pose is the root's, at path[NOW]. True for a better plan."""
+    """One iteration; see the module's text. The pose is the root's, at path[NOW]. True for a better plan.
+
+    Nodes before `hold` on the path keep to the plan.
+    """
     begin(chart)
     keep = tree.stats.shape[1] - 1
     end = tree.mark[LENGTH]
@@ -255,7 +259,7 @@ def iterate(
         following = node + 1
         there = tree.at[node] + rules.spacing if following >= tree.mark[NODES] else tree.at[following]
         may_keep = not fresh and there + rules.spacing <= end and following < tree.at.size
-        action = select(node, tree, rules, may_keep)
+        action = keep if tree.at[node] < hold else select(node, tree, rules, may_keep)
         if action != keep:
             break
         tree.stats[node, keep, N_A] += 1.0
@@ -266,7 +270,7 @@ def iterate(
         t = there
         if following >= tree.mark[NODES]:
             add_node(following, t, row, col, chart, tree, rules, labels, home)
-            fresh = True
+            fresh = t > hold
         node = following
     if action < 0:
         restore(chart)

@@ -12,9 +12,11 @@ class SweepSettings:
 
     Attributes:
         iterations: simulations a decision, at most; None for as many as the deadline allows.
-        patience: simulations in a row without a better plan, over the decisions, after which the plan is
-            flown without thinking, until something is seen that the plan did not expect. When the plan is
-            carried on, thinking resumes for the part of this that the plan leaves undetected.
+        patience: simulations in a row without a better plan, over the decisions, after which the search goes on
+            from another start, as a challenger of the plan (`roisearch.planners.challenge`).
+        restarts: challengers in a row that do not become the plan, after which it is flown without thinking,
+            until something is seen that it did not expect. When the plan is carried on, thinking resumes for the
+            part of this and of the patience that it leaves undetected.
         least: part of the mass that was there at first, below which the plan is flown without thinking:
             what is left lies thin and far apart, and the order of it hardly matters.
         horizon: steps that a simulation looks ahead.
@@ -30,7 +32,8 @@ class SweepSettings:
     """
 
     iterations: int | None = 4
-    patience: int = 150
+    patience: int = 60
+    restarts: int = 20
     least: float = 0.1
     horizon: int = 4000
     explore: float = 1.0
@@ -45,6 +48,8 @@ class SweepSettings:
     def __post_init__(self) -> None:
         if self.iterations is not None and self.iterations < 0:
             raise ValueError(f"iterations must be 0 or more, not {self.iterations}")
+        if self.restarts < 0:
+            raise ValueError(f"restarts must be 0 or more, not {self.restarts}")
         for name, least in (("horizon", 64), ("spacing", 1), ("path", 1), ("patience", 1)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")

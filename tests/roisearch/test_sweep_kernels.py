@@ -161,7 +161,7 @@ def test_iterations_leave_the_map_alone_and_the_value_is_that_of_the_path(seed: 
     planner._random[0] = seed
     args = (chart, tree, planner._rules, planner._labels, planner._home)
     for _ in range(40):
-        plans.iterate(3, 4, 0, *args, planner._wave, planner._random)
+        plans.iterate(3, 4, 0, *args, planner._wave, planner._random, 0)
         assert tree.value[plans.EXPECTED] <= value + 1e-9
         value = float(tree.value[plans.EXPECTED])
     for array, old in zip(snapshot(chart), before, strict=True):

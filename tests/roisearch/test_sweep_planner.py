@@ -276,7 +276,9 @@ def test_alternatives_say_what_was_thought_of_each_region() -> None:
 
 def test_thinking_rests_when_the_plan_gets_no_better_and_a_hit_wakes_it() -> None:
     belief, rng = Belief(hill((40, 40), (20, 25), 4.0)), np.random.default_rng(0)
-    planner = SweepPlanner(SweepSettings(iterations=20, patience=30, horizon=1500), fov=FOVS["point"])
+    planner = SweepPlanner(
+        SweepSettings(iterations=20, patience=30, restarts=1, horizon=1500), fov=FOVS["point"]
+    )
     state, thought = SearchState((20, 20)), []
     for _ in range(60):
         decision = planner.plan(belief, state, rng)

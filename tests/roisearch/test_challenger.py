@@ -1,0 +1,118 @@
+"""Challengers of the plan: they keep the steps being flown, are worth what is said of them, and win when better."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from roisearch import Belief, FieldOfView, SearchState
+from roisearch.kernels import plans
+from roisearch.planners.challenge import LEAVES
+from roisearch.planners.sweep import SweepPlanner
+from roisearch.planners.sweep_settings import SweepSettings
+
+from .test_sweep_planner import after, hill
+
+POINT = FieldOfView.point()
+HILLS = sum(
+    height * hill((90, 90), place, width)
+    for height, place, width in [
+        (1.0, (12, 70), 5.0), (0.9, (70, 15), 6.0), (0.8, (75, 75), 4.0), (1.0, (40, 35), 3.0), (0.7, (15, 20), 4.0)
+    ]
+)  # fmt: skip
+
+
+def restless(**more: int | float) -> SweepPlanner:
+    options = {"iterations": 30, "patience": 10, "restarts": 50, "horizon": 700} | more
+    return SweepPlanner(SweepSettings(**options), fov=POINT)  # type: ignore[arg-type]
+
+
+def both(planner: SweepPlanner) -> tuple[plans.Tree, plans.Tree]:
+    return planner._tree, planner._challenger.tree
+
+
+def worth(planner: SweepPlanner, tree: plans.Tree) -> float:
+    return plans.evaluate(*planner._pose, planner._chart, tree, planner._rules)
+
+
+@pytest.mark.parametrize("p_tn", [1.0, 0.98])
+def test_a_challenger_keeps_the_next_steps_and_is_worth_what_is_said_of_it(p_tn: float) -> None:
+    belief, rng, noise = Belief(HILLS), np.random.default_rng(0), np.random.default_rng(1)
+    planner, state = restless(horizon=300), SearchState((5, 5))
+    seen = left_plan = 0
+    for _ in range(700):  # the flown part of the path is forgotten twice
+        state = after(state, planner.plan(belief, state, rng).path[0])
+        plan, other = both(planner)
+        now = int(plan.mark[plans.NOW])
+        assert worth(planner, plan) == pytest.approx(plan.value[plans.EXPECTED], rel=1e-7)
+        if planner._challenger.is_open:
+            seen += 1
+            leaves = planner._challenger.leaves
+            assert now < leaves <= now + LEAVES[1]
+            np.testing.assert_array_equal(other.path[now:leaves], plan.path[now:leaves])
+            left_plan += not np.array_equal(other.path[now : now + 250], plan.path[now : now + 250])
+            assert other.mark[plans.NOW] == now
+            assert other.value[plans.UNDETECTED] == plan.value[plans.UNDETECTED]
+            assert worth(planner, other) == pytest.approx(other.value[plans.EXPECTED], rel=1e-7)
+        belief.observe([state.cell], bool(noise.random() > p_tn), 0.9, p_tn)
+    assert seen > 100
+    assert left_plan > 50
+
+
+def test_from_one_place_the_plan_only_gets_better_and_then_rests() -> None:
+    belief, rng = Belief(HILLS), np.random.default_rng(2)
+    planner, state = restless(restarts=8, iterations=10), SearchState((5, 5))
+    values, won = [], 0
+    for _ in range(600):
+        before, length = planner._tree if planner._world else None, len(values)
+        decision = planner.plan(belief, state, rng)
+        values.append(float(planner._tree.value[plans.EXPECTED]))
+        won += before is not None and planner._tree is not before
+        if decision.effort.iterations == 0:
+            break
+    assert 0 < length < 599
+    assert won > 0
+    assert (np.diff(values) <= 0.0).all()
+    assert planner._challenger.lost == 8
+    assert not planner._challenger.is_open
+
+
+def test_nothing_before_the_held_place_is_tried() -> None:
+    planner = restless(iterations=0)
+    planner.plan(Belief(HILLS), SearchState((5, 5)), np.random.default_rng(3))
+    tree, hold = planner._tree, 150
+    first = tree.path[:hold].copy()
+    before = float(tree.value[plans.EXPECTED])
+    better = [planner._iterate(planner._pose, tree, hold) for _ in range(300)]
+    assert any(better)
+    assert tree.value[plans.EXPECTED] < before
+    np.testing.assert_array_equal(tree.path[:hold], first)
+    held = tree.stats[: tree.mark[plans.NODES]][tree.at[: tree.mark[plans.NODES]] < hold]
+    assert held[:, :-1, plans.N_A].sum() == 0
+
+
+def test_a_hit_forgets_the_challenger() -> None:
+    belief, rng, state = Belief(HILLS), np.random.default_rng(4), SearchState((5, 5))
+    planner = restless()
+    while not planner._world or not planner._challenger.is_open:
+        state = after(state, planner.plan(belief, state, rng).path[0])
+        belief.observe([state.cell], False, 0.9, 0.98)
+    planner._challenger.lost = 3
+    belief.observe([state.cell], True, 0.9, 0.98)
+    planner._follow(belief, state.cell, planner._pose)
+    assert not planner._challenger.is_open
+    assert planner._challenger.lost == 0
+
+
+def test_who_wins_keeps_what_was_thought_of_the_other_actions() -> None:
+    belief, rng, state = Belief(HILLS), np.random.default_rng(2), SearchState((5, 5))
+    planner = restless(restarts=20, iterations=10)
+    planner.plan(belief, state, rng)
+    for _ in range(600):
+        before, visits = planner._tree, planner._tree.stats[0, :, plans.N_A].copy()
+        planner.plan(belief, state, rng)
+        if planner._tree is not before:
+            break
+    assert planner._tree is not before
+    assert visits[4:-1].sum() > 0
+    assert (planner._tree.stats[0, :, plans.N_A] >= visits).all()

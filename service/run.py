@@ -218,7 +218,7 @@ class Service:
         if self.world is not None:
             report["simulated"] = simulated(self.world.target, self.view.mission, self.settings)
         try:
-            write_results(self.folder, self.view.mission, report, self.view.picture())
+            write_results(self.folder, self.view.mission, report, self.view.picture()())
         except OSError as error:
             log.error("%s: the results cannot be written (%s)", self.folder, error.strerror)
         return EXIT_CODES[report["outcome"]]

@@ -25,7 +25,7 @@ from service.export.wishes import Wishes
 from service.mission.flight import LatLon
 from service.mission.navigator import Cell, straight_part
 from service.preview.foresight import foresee
-from service.preview.pace import climb_seconds, leg_seconds
+from service.preview.pace import climb_seconds, farthest_from_launch, route_seconds
 from service.search import Search
 from service.view.shapes import on_earth
 
@@ -114,12 +114,10 @@ def turning_cells(cells: Sequence[Cell]) -> list[Cell]:
 def _seconds(run: Run, wishes: Wishes) -> float:
     """How long the search itself may take: the mission less take-off, landing and the longest way home."""
     grid, flight = run.grid, run.settings.flight
-    cells = grid.frame.to_metres(grid.frame.to_latlon(np.argwhere(grid.flyable)))
-    home = grid.frame.to_metres([grid.launch])[0]
-    farthest = float(np.hypot(*(cells - home).T).max())
+    farthest = route_seconds(grid, flight, farthest_from_launch(grid), grid.launch)
     most = flight.max_flight_s if wishes.minutes is None else 60.0 * wishes.minutes
     landing = flight.return_height_m / flight.descent_mps
-    around = climb_seconds(flight) + 2.0 * leg_seconds(farthest, flight) + landing
+    around = climb_seconds(flight) + 2.0 * farthest + landing
     if most <= around:
         raise BadInput(
             f"{run.name}: {most / 60:g} minutes are too short: take-off, landing and the longest way there and home "

@@ -159,7 +159,7 @@ def create_app(
 
     @app.get("/api/map.png", summary="The same as a picture", response_class=Response, responses=PNG)
     async def picture(at: At = None) -> Response:
-        return Response(await asyncio.to_thread(then(at).picture), media_type="image/png")
+        return Response(await asyncio.to_thread(then(at).picture()), media_type="image/png")
 
     @app.get(
         "/api/decisions",

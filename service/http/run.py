@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,8 +30,8 @@ class Run(Protocol):
         """The map as RFC 7946."""
         ...
 
-    def picture(self) -> bytes:
-        """The map as a PNG."""
+    def picture(self) -> Callable[[], bytes]:
+        """What draws the map as it is now, as a PNG."""
         ...
 
     def decisions(self, count: int) -> list[dict[str, Any]]:

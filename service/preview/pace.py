@@ -13,6 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from service.area import Grid, way_home
+from service.area.model import LatLon
+from service.area.projection import FloatArray
 from service.config import FlightSettings
 
 ARMING_S = 4.0
@@ -54,3 +57,22 @@ def cell_seconds(
         times += [times[begun] + seconds * (step + 1) / count for step in range(count)]
         begun = end
     return np.array(times)
+
+
+def way_metres(grid: Grid, start: LatLon, end: LatLon) -> FloatArray:
+    """The way around what must not be flown over, its start included, in metres of the grid [k, 2]."""
+    return grid.frame.to_metres([start, *way_home(grid, start, end)])
+
+
+def route_seconds(grid: Grid, flight: FlightSettings, start: LatLon, end: LatLon) -> float:
+    """Seconds for that way, at the height of the search."""
+    legs = np.hypot(*np.diff(way_metres(grid, start, end), axis=0).T)
+    return sum(leg_seconds(float(length), flight) for length in legs)
+
+
+def farthest_from_launch(grid: Grid) -> LatLon:
+    """The flyable cell that is farthest from the launch point, as the crow flies."""
+    cells = grid.frame.to_latlon(np.argwhere(grid.flyable))
+    metres = grid.frame.to_metres(cells) - grid.frame.to_metres([grid.launch])[0]
+    lat, lon = cells[int(np.hypot(*metres.T).argmax())]
+    return float(lat), float(lon)

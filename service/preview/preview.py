@@ -12,14 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from roisearch import Regions
-from service.area import Grid, SearchArea, way_home
-from service.area.projection import FloatArray
+from service.area import Grid, SearchArea
 from service.config import Settings
 from service.errors import BadInput
 from service.mission.energy import Energy, WayHome
 from service.mission.flight import LatLon
 from service.preview.foresight import Foresight, foresee
-from service.preview.pace import climb_seconds, leg_seconds
+from service.preview.pace import climb_seconds, farthest_from_launch, route_seconds, way_metres
 from service.search import Search
 
 GOALS = (0.5, 0.75, 0.95)
@@ -98,8 +97,8 @@ def preview(
     reachable = (1.0 - grid.outside) * seen
     until = min(max(GOALS), ENOUGH * reachable)
     start = grid.frame.to_latlon([grid.start])[0]
-    before = climb_seconds(flight) + _route_seconds(
-        grid, settings, grid.launch, (float(start[0]), float(start[1]))
+    before = climb_seconds(flight) + route_seconds(
+        grid, flight, grid.launch, (float(start[0]), float(start[1]))
     )
     home = _longest_way_home(grid, settings)
     battery, kept = flight.max_flight_s, None
@@ -180,19 +179,6 @@ def _regions(grid: Grid, search: Search) -> tuple[Region, ...]:
 
 def _longest_way_home(grid: Grid, settings: Settings) -> WayHome:
     """From the cell that is farthest from the launch point, as the flight itself will reckon it."""
-    cells = grid.frame.to_latlon(np.argwhere(grid.flyable))
-    metres = grid.frame.to_metres(cells) - grid.frame.to_metres([grid.launch])[0]
-    lat, lon = cells[int(np.hypot(*metres.T).argmax())]
-    points = _metres(grid, (float(lat), float(lon)), grid.launch)
+    points = way_metres(grid, farthest_from_launch(grid), grid.launch)
     flight = settings.flight
     return WayHome.along([(east, -south) for east, south in points.tolist()], flight.altitude_m, None, flight)
-
-
-def _route_seconds(grid: Grid, settings: Settings, start: LatLon, end: LatLon) -> float:
-    legs = np.hypot(*np.diff(_metres(grid, start, end), axis=0).T)
-    return sum(leg_seconds(float(length), settings.flight) for length in legs)
-
-
-def _metres(grid: Grid, start: LatLon, end: LatLon) -> FloatArray:
-    """The way around what must not be flown over, its start included, in metres of the grid [k, 2]."""
-    return grid.frame.to_metres([start, *way_home(grid, start, end)])

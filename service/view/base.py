@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -120,8 +121,8 @@ class BaseView:
             features.append(feature(place, "found", probability=found["probability"]))
         return collection(features, pos=state["pos"], outside=state["outside"], time=state["time"])
 
-    def picture(self) -> bytes:
-        """The map as a PNG."""
+    def picture(self) -> Callable[[], bytes]:
+        """What draws the map as it is now, as a PNG; drawing takes long, and may be left to another thread."""
         from service.view.picture import Scene, draw_scene  # matplotlib: not before somebody looks
 
         state = self.state()
@@ -130,21 +131,20 @@ class BaseView:
         if found:
             said += f" · found at {found['lat']:.6f}, {found['lon']:.6f}"
             said += f" with probability {found['probability']:.4f}"
-        return draw_scene(
-            Scene(
-                grid=self.search.grid,
-                probability=self.search.belief.probability(),
-                pod=self.search.record.pod(),
-                labels=self.search.regions.labels,
-                track=self.track(),
-                ahead=state["ahead"],
-                hits=self.hits(),
-                aircraft=(pose["lat"], pose["lon"]) if pose else None,
-                found=(found["lat"], found["lon"]) if found else None,
-                title=f"{self.area.name}: {state['state']}",
-                subtitle=said,
-            )
+        scene = Scene(
+            grid=self.search.grid,
+            probability=self.search.belief.probability(),
+            pod=self.search.record.pod(),
+            labels=self.search.regions.labels,
+            track=self.track(),
+            ahead=state["ahead"],
+            hits=tuple(self.hits()),
+            aircraft=(pose["lat"], pose["lon"]) if pose else None,
+            found=(found["lat"], found["lon"]) if found else None,
+            title=f"{self.area.name}: {state['state']}",
+            subtitle=said,
         )
+        return functools.partial(draw_scene, scene)
 
     def scene(self) -> dict[str, Any]:
         """What does not change during a run, for the page."""

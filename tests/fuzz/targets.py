@@ -202,8 +202,8 @@ class OpenDoor:
     def map(self) -> dict[str, Any]:
         return {}
 
-    def picture(self) -> bytes:
-        return b""
+    def picture(self) -> Callable[[], bytes]:
+        return bytes
 
     def ready(self) -> bool:
         return True

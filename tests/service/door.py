@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -39,8 +39,8 @@ class FakeRun:
     def geojson(self) -> dict[str, Any]:
         return {"type": "FeatureCollection", "features": []}
 
-    def picture(self) -> bytes:
-        return b"\x89PNG"
+    def picture(self) -> Callable[[], bytes]:
+        return lambda: b"\x89PNG"
 
     def decisions(self, count: int) -> list[dict[str, Any]]:
         return [{"reason": "because"}][:count]

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from service.area import Grid, SearchArea
+from service.area import Grid, SearchArea, leg_is_clear
 from service.commands.preview import main
 from service.config import FlightSettings, Settings
 from service.errors import BadInput
 from service.preview.foresight import Foresight, foresee
-from service.preview.pace import cell_seconds, leg_seconds
+from service.preview.pace import cell_seconds, farthest_from_launch, leg_seconds, route_seconds
 from service.preview.preview import preview
 from service.preview.text import facts
 from service.search import Search
@@ -67,6 +67,20 @@ def test_a_path_takes_as_long_as_its_legs() -> None:
     stopped = cell_seconds(cells, [4], 25.0, FLIGHT)
     assert stopped[-1] == pytest.approx(2 * leg_seconds(50.0, FLIGHT) + leg_seconds(25.0, FLIGHT))
     assert cell_seconds([(3, 3)], [], 25.0, FLIGHT).tolist() == [0.0]
+
+
+def test_the_way_home_goes_around_what_is_excluded(field: tuple[SearchArea, Grid]) -> None:
+    grid, detours = field[1], 0
+    for row, col in np.argwhere(grid.flyable):
+        lat, lon = grid.frame.to_latlon([(row, col)])[0].tolist()
+        straight = np.hypot(*np.diff(grid.frame.to_metres([(lat, lon), grid.launch]), axis=0)[0])
+        seconds = route_seconds(grid, FLIGHT, (lat, lon), grid.launch)
+        clear = leg_is_clear(grid, (lat, lon), grid.launch)
+        assert clear == (seconds == pytest.approx(leg_seconds(straight, FLIGHT)))
+        detours += not clear
+    assert detours > 0
+    lat, lon = farthest_from_launch(grid)
+    assert grid.flyable[tuple(grid.frame.to_cells([(lat, lon)])[0])]
 
 
 @pytest.mark.parametrize("alarms", [False, True])

@@ -421,7 +421,7 @@ class SweepPlanner:
         warm_up(make, self._fov, progress)
 
     def _exercise(self, shape: tuple[int, ...]) -> None:
-        """Use what two decisions may not: looks without a hit, and carrying the plan on."""
+        """Use what two decisions may not: looks without a hit, a challenger, and carrying the plan on."""
         belief = Belief(1.0 + np.indices(shape).sum(axis=0))
         state, rng = SearchState((0, 0)), np.random.default_rng(0)
         for _ in range(2):
@@ -433,6 +433,8 @@ class SweepPlanner:
             state = SearchState(cell, heading)
             belief.observe([cell], False, 0.9, 0.9)
         self.plan(belief, state, rng)
+        self._stale = self.settings.patience
+        self._think(self._pose)
         plans.extend(
             *self._pose, self._chart, self._tree, self._rules, self._labels, self._home, 80, self._wave
         )

@@ -76,5 +76,5 @@ class Challenger:
         self.is_open = False
 
     def forget(self, lost: int = 0) -> None:
-        """The plan is another one, so that this challenger says nothing about it, and at most `lost` before it do."""
+        """The plan has changed: there is no challenger any more, and at most `lost` count as lost against it."""
         self.is_open, self.lost = False, min(self.lost, lost)

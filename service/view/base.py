@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -123,28 +122,32 @@ class BaseView:
 
     def picture(self) -> Callable[[], bytes]:
         """What draws the map as it is now, as a PNG; drawing takes long, and may be left to another thread."""
-        from service.view.picture import Scene, draw_scene  # matplotlib: not before somebody looks
-
         state = self.state()
         pose, found = state["pose"], state["found"]
         said = f"POS {state['pos']:.0%}, {state['steps']} steps, {state['flight_time_s']:.0f} s in the air"
         if found:
             said += f" · found at {found['lat']:.6f}, {found['lon']:.6f}"
             said += f" with probability {found['probability']:.4f}"
-        scene = Scene(
-            grid=self.search.grid,
-            probability=self.search.belief.probability(),
-            pod=self.search.record.pod(),
-            labels=self.search.regions.labels,
-            track=self.track(),
-            ahead=state["ahead"],
-            hits=tuple(self.hits()),
-            aircraft=(pose["lat"], pose["lon"]) if pose else None,
-            found=(found["lat"], found["lon"]) if found else None,
-            title=f"{self.area.name}: {state['state']}",
-            subtitle=said,
-        )
-        return functools.partial(draw_scene, scene)
+        shown = {
+            "grid": self.search.grid,
+            "probability": self.search.belief.probability(),
+            "pod": self.search.record.pod(),
+            "labels": self.search.regions.labels,
+            "track": self.track(),
+            "ahead": state["ahead"],
+            "hits": tuple(self.hits()),
+            "aircraft": (pose["lat"], pose["lon"]) if pose else None,
+            "found": (found["lat"], found["lon"]) if found else None,
+            "title": f"{self.area.name}: {state['state']}",
+            "subtitle": said,
+        }
+
+        def draw() -> bytes:
+            from service.view.picture import Scene, draw_scene  # matplotlib: it takes long to import, too
+
+            return draw_scene(Scene(**shown))
+
+        return draw
 
     def scene(self) -> dict[str, Any]:
         """What does not change during a run, for the page."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.mavlink.autopilots.base import Autopilot
@@ -211,3 +212,14 @@ class Rig:
             for m in self.sent
             if m.get_type() not in ("HEARTBEAT", "STATUSTEXT") and getattr(m, "command", None) not in quiet
         ]
+
+
+FLAVORS = pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
+REPOSITION = 192
+ALT = GROUND + 20.0
+NORTH = LAT + 0.0003
+
+
+def go(rig: Rig, lat: float = NORTH, lon: float = LON, alt: float = ALT) -> None:
+    """Order the vehicle of a rig to a place."""
+    rig.core.reposition(lat, lon, alt, rig.now)

@@ -94,9 +94,12 @@ def test_nothing_before_the_held_place_is_tried() -> None:
 def test_a_hit_forgets_the_challenger() -> None:
     belief, rng, state = Belief(HILLS), np.random.default_rng(4), SearchState((5, 5))
     planner = restless()
-    while not planner._world or not planner._challenger.is_open:
+    for _ in range(50):
         state = after(state, planner.plan(belief, state, rng).path[0])
         belief.observe([state.cell], False, 0.9, 0.98)
+        if planner._challenger.is_open:
+            break
+    assert planner._challenger.is_open
     planner._challenger.lost = 3
     belief.observe([state.cell], True, 0.9, 0.98)
     planner._follow(belief, state.cell, planner._pose)

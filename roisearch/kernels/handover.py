@@ -53,13 +53,8 @@ class Layout:
 
     def __init__(self, **kinds: DTypeLike | tuple[DTypeLike, int]) -> None:
         self._arrays = {name: kind for name, kind in kinds.items() if isinstance(kind, tuple)}
-        self.dtype = np.dtype(
-            [
-                (name, _reference(*kind) if isinstance(kind, tuple) else np.dtype(kind))
-                for name, kind in kinds.items()
-            ],
-            align=True,
-        )
+        fields = [(name, _field(kind)) for name, kind in kinds.items()]
+        self.dtype: np.dtype[Any] = np.dtype(fields, align=True)
 
     def pack(self, **things: Any) -> Parcel:
         """Pack an array or a number for every name; raises ValueError like `record_of`."""
@@ -102,6 +97,11 @@ class Layout:
 
         made: Callable[[int], Any] = _intrinsic(opened)
         return made
+
+
+def _field(kind: Any) -> np.dtype[Any]:
+    """How an array or a number is kept in the record."""
+    return _reference(*kind) if isinstance(kind, tuple) else np.dtype(kind)
 
 
 def _reference(dtype: DTypeLike, dimensions: int) -> np.dtype[Any]:

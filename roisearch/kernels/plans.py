@@ -88,6 +88,20 @@ class Tree(NamedTuple):
     value: Floats
 
 
+class Desk(NamedTuple):
+    """What the kernels of a plan work on, beside it: see `Chart`, `Rules`, `Wave` and `roisearch.kernels.sweeps`.
+
+    labels: int32 [cells], home: int32 [blocks], of the regions. random: uint64 [1], state of `draw`.
+    """
+
+    chart: Chart
+    rules: Rules
+    labels: NDArray[np.int32]
+    home: NDArray[np.int32]
+    wave: Wave
+    random: NDArray[np.uint64]
+
+
 NOW, LENGTH, NODES = 0, 1, 2
 P_A, LOSS, N_A = 0, 1, 2
 EXPECTED, UNDETECTED, LEFT = 0, 1, 2
@@ -368,6 +382,15 @@ def advance(
     tree.value[UNDETECTED] = undetected
     tree.mark[NOW] += steps
     return row, col, heading
+
+
+def shift(tree: Tree) -> None:
+    """Forget the flown part of the path."""
+    now, length = int(tree.mark[NOW]), int(tree.mark[LENGTH])
+    for array in (tree.path, tree.action):
+        array[: length - now] = array[now:length].copy()
+    tree.at[: tree.mark[NODES]] -= now
+    tree.mark[NOW], tree.mark[LENGTH] = 0, length - now
 
 
 @kernel

@@ -1,10 +1,4 @@
-"""A second plan, grown beside the one that is flown: iterated local search over plans.
-
-The search over sweeps climbs to a plan that no single tried line makes better. Another start leads to another such
-plan, a point or two better or worse. So when the plan has not got better for long, a *challenger* is made: it keeps
-the plan's next steps, which are flown in the meantime, and goes on from there by the rollout's rule. It is searched as
-the plan is, but only from the place on where it leaves it, and becomes the plan as soon as it is the better one.
-"""
+"""A second plan, grown beside the one that is flown; see `roisearch.planners.thinking`."""
 
 from __future__ import annotations
 
@@ -34,14 +28,18 @@ class Challenger:
         self.is_open = False
         self.leaves = self.stale = self.lost = 0
 
-    def begin(self, tree: plans.Tree, share: float) -> None:
-        """Keep the plan as far as `share`, 0 to 1, says; it is for the caller to carry it on from there."""
+    def begin(self, tree: plans.Tree, share: float, whole: bool) -> None:
+        """Leave the plan where `share`, 0 to 1, says.
+
+        It is a copy of the `whole` plan, or ends there, for the caller to carry it on.
+        """
         own, now, length = self.tree, int(tree.mark[NOW]), int(tree.mark[LENGTH])
         least, most = LEAVES
         self.leaves = min(length, now + int(least * (most / least) ** share))
+        end = length if whole else self.leaves
         for mine, its in ((own.path, tree.path), (own.action, tree.action)):
-            mine[now : self.leaves] = its[now : self.leaves]
-        own.mark[NOW], own.mark[LENGTH], own.mark[NODES] = now, self.leaves, 0
+            mine[now:end] = its[now:end]
+        own.mark[NOW], own.mark[LENGTH], own.mark[NODES] = now, end, 0
         own.value[:] = tree.value
         self.is_open, self.stale = True, 0
 
@@ -54,9 +52,9 @@ class Challenger:
         if own.mark[NOW] >= self.leaves:
             self.lose()
 
-    def beats(self, tree: plans.Tree) -> bool:
-        """Whether it is better than the plan, as far as both go."""
-        own, margin = self.tree, 1.0 - 1e-9
+    def beats(self, tree: plans.Tree, margin: float = 1.0 - 1e-9) -> bool:
+        """Whether its expected time is below `margin` times the plan's, as far as both go."""
+        own = self.tree
         return bool(
             own.mark[LENGTH] == tree.mark[LENGTH] and own.value[EXPECTED] < margin * tree.value[EXPECTED]
         )

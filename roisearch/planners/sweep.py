@@ -16,9 +16,9 @@ from roisearch.kernels import chart as charts
 from roisearch.kernels import plans
 from roisearch.kernels.sweeps import ANYWHERE, Wave
 from roisearch.planners.base import Progress, Scene, World, any_move, remark_on
-from roisearch.planners.challenge import Challenger
 from roisearch.planners.looks import Watch
 from roisearch.planners.sweep_settings import SweepSettings
+from roisearch.planners.thinking import Thinking
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions, segment_regions
 
@@ -63,7 +63,6 @@ class SweepPlanner:
         self._random = np.zeros(1, dtype=np.uint64)
         self._seconds = 0.0  # of one iteration, lately
         self._at_first = 0.0  # mass when the belief was taken over
-        self._stale = 0  # iterations since the plan got better
         self._hits = 0
         self._unseen = 0.0  # mass flown over and not reported
 
@@ -110,7 +109,7 @@ class SweepPlanner:
         self._labels = nearest_labels(regions.labels)
         self._home = homes(self._labels, (rows, cols))
         most = 3 * s.horizon + 4096
-        self._tree = plans.Tree(
+        tree = plans.Tree(
             path=np.zeros(most, dtype=np.int64),
             trial=np.zeros(most, dtype=np.int64),
             action=np.zeros(most, dtype=np.int64),
@@ -122,8 +121,9 @@ class SweepPlanner:
             scores=np.zeros(1 + regions.count),
             value=np.zeros(3),
         )
-        self._challenger = Challenger(self._tree)
         self._rules = self._make_rules(rows, cols, scene.ground.is_open)
+        desk = plans.Desk(self._chart, self._rules, self._labels, self._home, self._wave, self._random)
+        self._thinking = Thinking(tree, desk, s, anneals=fov.is_point)
         self._viewable = np.ascontiguousarray(scene.part.viewable.ravel())
         self._belief = None
 
@@ -185,66 +185,30 @@ class SweepPlanner:
         horizon = self.settings.horizon
         if tree.mark[plans.LENGTH] - tree.mark[plans.NOW] < horizon - min(512, horizon // 4):
             plans.extend(row, col, heading, chart, tree, rules, labels, home, horizon, wave)
-            self._resume()
-        for each in self._plans():
+            self._thinking.carried_on()
+        for each in self._thinking.plans():
             plans.settle_root(row, col, chart, each, rules, labels, home)
         done = 0
         most = self.settings.iterations
         if self._has_nothing_to_think_about():
             most = 0
-        while (most is None or done < most) and self._is_restless():
+        while (most is None or done < most) and self._thinking.is_restless():
             before = time.perf_counter()
             if deadline_s is not None and before + self._seconds > began + deadline_s:
                 break
-            self._think(pose)
+            self._thinking.iterate(pose)
             self._seconds = 0.9 * self._seconds + 0.1 * (time.perf_counter() - before)
             done += 1
         return self._decide(belief, scene, state.cell, done, began)
 
-    def _plans(self) -> list[plans.Tree]:
-        """The plan, and the challenger's when there is one."""
-        return [self._tree, self._challenger.tree] if self._challenger.is_open else [self._tree]
-
-    def _is_restless(self) -> bool:
-        """Whether more thinking may make the plan better."""
-        return self._stale < self.settings.patience or self._challenger.lost < self.settings.restarts
-
-    def _think(self, pose: tuple[int, int, int]) -> None:
-        """One iteration: on the plan, or on a challenger when the plan has not got better for long."""
-        rival = self._challenger
-        if self._stale < self.settings.patience:
-            self._stale = 0 if self._iterate(pose, self._tree, 0) else self._stale + 1
-            return
-        if not rival.is_open:
-            rival.begin(self._tree, plans.draw(self._random))
-            left = int(self._tree.mark[plans.LENGTH] - self._tree.mark[plans.NOW])
-            row, col, heading = pose
-            where = (self._chart, rival.tree, self._rules, self._labels, self._home)
-            plans.extend(row, col, heading, *where, left, self._wave)
-            plans.settle_root(row, col, *where)
-        rival.stale = 0 if self._iterate(pose, rival.tree, rival.leaves) else rival.stale + 1
-        if rival.beats(self._tree):
-            self._tree = rival.replace(self._tree)
-            self._stale = 0
-        elif rival.stale >= self.settings.patience:
-            rival.lose()
-
-    def _iterate(self, pose: tuple[int, int, int], tree: plans.Tree, hold: int) -> bool:
-        """One iteration on a plan from index `hold` of its path on; whether it got better."""
-        return plans.iterate(
-            *pose, self._chart, tree, self._rules, self._labels, self._home, self._wave, self._random, hold
-        )
+    @property
+    def _tree(self) -> plans.Tree:
+        """The plan."""
+        return self._thinking.tree
 
     def _has_nothing_to_think_about(self) -> bool:
         """Whether so little is left that the order in which it is searched hardly matters."""
         return bool(self._tree.value[plans.UNDETECTED] < self.settings.least * self._at_first)
-
-    def _resume(self) -> None:
-        """Think again about a plan that was carried on, in proportion to what it leaves undetected."""
-        left, now = self._tree.value[plans.LEFT], self._tree.value[plans.UNDETECTED]
-        share = left / now if now > 0.0 else 0.0
-        self._stale = min(self._stale, int((1.0 - share) * self.settings.patience))
-        self._challenger.forget(int((1.0 - share) * self.settings.restarts))
 
     def _follow(self, belief: Belief, cell: tuple[int, int], pose: tuple[int, int, int]) -> None:
         """Bring map and plan to where the drone is and what was seen."""
@@ -263,7 +227,7 @@ class SweepPlanner:
         if steps > 0:
             before = tree.value[plans.EXPECTED]
             flown = plans.advance(steps, *self._pose, chart, tree)
-            self._challenger.follow(tree, before - tree.value[plans.EXPECTED])
+            self._thinking.flown(before - tree.value[plans.EXPECTED])
             seen = self._seen(self._pose, steps)
             touched = [*touched, *seen]
             self._pose = flown
@@ -275,12 +239,10 @@ class SweepPlanner:
         if lost or belief.hits != self._hits or self._unseen > UNSEEN * tree.value[plans.UNDETECTED]:
             self._replan(pose, 0 if lost else PAUSE)
         elif changed:
-            for each in self._plans():
-                each.value[plans.UNDETECTED] = tree.value[plans.UNDETECTED]
-                each.value[plans.EXPECTED] = plans.evaluate(*pose, chart, each, self._rules)
+            self._thinking.corrected(tree.value[plans.UNDETECTED], pose)
         self._hits = belief.hits
         if tree.mark[plans.NOW] > self.settings.horizon:
-            self._shift()
+            self._thinking.shift()
 
     def _differing(self, belief: Belief) -> NDArray[np.int64] | None:
         """Where `belief` differs from what the chart was made from, cells [k, 2]; None if that is another map.
@@ -297,8 +259,7 @@ class SweepPlanner:
     def _replan(self, pose: tuple[int, int, int], pause: int) -> None:
         """Plan anew from here; see `plans.replan`."""
         self._unseen = 0.0
-        self._stale = 0
-        self._challenger.forget()
+        self._thinking.replanned()
         plans.replan(
             *pose, self._chart, self._tree, self._rules, self._labels, self._home, self.settings.horizon,
             pause, self._wave,
@@ -365,16 +326,6 @@ class SweepPlanner:
         share: NDArray[np.float64] = np.power(self.settings.contradicted, belief.contradicted(cells))
         return share
 
-    def _shift(self) -> None:
-        """Forget the flown part of the plans."""
-        self._challenger.leaves -= int(self._tree.mark[plans.NOW])
-        for tree in self._plans():
-            now, length = int(tree.mark[plans.NOW]), int(tree.mark[plans.LENGTH])
-            for array in (tree.path, tree.action):
-                array[: length - now] = array[now:length].copy()
-            tree.at[: tree.mark[plans.NODES]] -= now
-            tree.mark[plans.NOW], tree.mark[plans.LENGTH] = 0, length - now
-
     def _decide(
         self, belief: Belief, scene: Scene, cell: tuple[int, int], iterations: int, began: float
     ) -> Decision:
@@ -433,11 +384,7 @@ class SweepPlanner:
             state = SearchState(cell, heading)
             belief.observe([cell], False, 0.9, 0.9)
         self.plan(belief, state, rng)
-        self._stale = self.settings.patience
-        self._think(self._pose)
-        plans.extend(
-            *self._pose, self._chart, self._tree, self._rules, self._labels, self._home, 80, self._wave
-        )
+        self._thinking.exercise(self._pose)
 
 
 def spread_of(fov: FieldOfView) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -277,7 +277,7 @@ def test_alternatives_say_what_was_thought_of_each_region() -> None:
 def test_thinking_rests_when_the_plan_gets_no_better_and_a_hit_wakes_it() -> None:
     belief, rng = Belief(hill((40, 40), (20, 25), 4.0)), np.random.default_rng(0)
     planner = SweepPlanner(
-        SweepSettings(iterations=20, patience=30, restarts=1, horizon=1500), fov=FOVS["point"]
+        SweepSettings(iterations=200, patience=30, restarts=1, horizon=1500), fov=FOVS["point"]
     )
     state, thought = SearchState((20, 20)), []
     for _ in range(60):
@@ -287,10 +287,10 @@ def test_thinking_rests_when_the_plan_gets_no_better_and_a_hit_wakes_it() -> Non
             break
         state = after(state, decision.path[0])
         belief.observe([state.cell], False, 0.9, 0.9)
-    assert thought[0] == 20
+    assert thought[0] == 200
     assert thought[-1] == 0
     belief.observe([state.cell], True, 0.9, 0.9)
-    assert planner.plan(belief, state, rng).effort.iterations == 20
+    assert planner.plan(belief, state, rng).effort.iterations == 200
 
 
 def test_what_is_left_of_a_searched_map_is_not_thought_about() -> None:

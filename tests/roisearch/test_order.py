@@ -1,0 +1,215 @@
+"""Annealing the order of looks: sums against a plain walk along the row, and what becomes of a plan."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from roisearch import Belief, FieldOfView, SearchState
+from roisearch.kernels import order, plans
+from roisearch.kernels.order import Looks
+from roisearch.planners.sweep import SweepPlanner
+from roisearch.planners.sweep_settings import SweepSettings
+from roisearch.planners.thinking import AHEAD
+from sim.scenario import paper_prior
+
+from .test_sweep_planner import after, hill
+
+POINT = FieldOfView.point()
+PRIOR = paper_prior(np.random.default_rng(1001))
+WALLS = np.ones(PRIOR.shape, dtype=bool)
+WALLS[60:140, 100] = WALLS[100, 20:90] = False
+HORIZON = 2500
+MAPS = {"open": None, "walls": WALLS}
+HOLD = 40
+
+
+def planner_on(flyable: NDArray[np.bool_] | None, **options: float) -> SweepPlanner:
+    """A planner with a plan of HORIZON steps by the rollout's rule."""
+    chosen = {"iterations": 0, "horizon": HORIZON} | options
+    planner = SweepPlanner(SweepSettings(**chosen), fov=POINT, flyable=flyable)  # type: ignore[arg-type]
+    planner.plan(Belief(PRIOR), SearchState((5, 5)), np.random.default_rng(0))
+    return planner
+
+
+@cache
+def planner_for(name: str) -> SweepPlanner:
+    return planner_on(MAPS[name])
+
+
+def row_of(planner: SweepPlanner) -> tuple[Looks, int, float]:
+    """The plan's looks from HOLD on."""
+    annealer = planner._thinking._annealer
+    assert annealer is not None
+    annealer.begin(planner._pose, planner._tree, HOLD, 10, 0.1)
+    annealer.is_open = False
+    return annealer._looks, annealer._n, annealer._whole
+
+
+def steps_between(a: int, b: int, looks: Looks) -> int:
+    """By walking the two ways with one bend."""
+    start, end = (looks.row[a], looks.col[a]), (looks.row[b], looks.col[b])
+    if start == end:
+        return 2
+    steps = abs(end[0] - start[0]) + abs(end[1] - start[1])
+    if looks.is_open:
+        return int(steps)
+    open_cells = looks.legal.reshape(looks.rows, looks.cols) > 0
+    rows = slice(min(start[0], end[0]), max(start[0], end[0]) + 1)
+    cols = slice(min(start[1], end[1]), max(start[1], end[1]) + 1)
+    one = open_cells[rows, start[1]].all() and open_cells[end[0], cols].all()
+    other = open_cells[start[0], cols].all() and open_cells[rows, end[1]].all()
+    return int(steps) if steps <= order.WAY and (one or other) else order.FAR
+
+
+def expected_time(looks: Looks, n: int, whole: float) -> float:
+    """Of the row, look by look; what is not detected waits until the end."""
+    step, total, left = 0, 0.0, whole
+    for place in range(1, n):
+        step += steps_between(place - 1, place, looks)
+        total += looks.worth[place] * step
+        left -= looks.worth[place]
+    return float(total + left * step)
+
+
+@given(
+    st.sampled_from(sorted(MAPS)),
+    st.lists(st.tuples(st.integers(0, 3), *[st.integers(0, 10**6)] * 3), max_size=6),
+)
+@settings(max_examples=30, deadline=None)
+def test_the_sums_tell_what_a_move_changes(name: str, moves: list[tuple[int, int, int, int]]) -> None:
+    looks, n, whole = row_of(planner_for(name))
+    before = expected_time(looks, n, whole)
+    for kind, a, b, c in moves:
+        first = 1 + a % (n - 2)
+        if kind == 0:
+            last, to, turned = first + b % (n - first), first - 1, True
+            told = order.delay_of_turn(first, last, n, whole, looks)
+        else:
+            last = min(n - 2, first + b % 60)
+            to = c % n
+            if first - 1 <= to <= last:
+                continue
+            turned = kind == 2
+            told = order.delay_of_shift(first, last, to, turned, n, whole, looks)
+        order.rearrange(first, last, to, turned, n, looks)
+        now = expected_time(looks, n, whole)
+        assert told == pytest.approx(now - before, rel=1e-9, abs=1e-9 * before)
+        before = now
+    step = np.concatenate([[0], np.cumsum([steps_between(i - 1, i, looks) for i in range(1, n)])])
+    np.testing.assert_allclose(looks.step[:n], step)
+    np.testing.assert_allclose(looks.worths[:n], np.cumsum(looks.worth[:n]), rtol=1e-9)
+    np.testing.assert_allclose(looks.moments[:n], np.cumsum(looks.worth[:n] * step), rtol=1e-9)
+    assert sorted(looks.number[:n]) == list(range(n))
+    np.testing.assert_array_equal(looks.place[looks.number[:n]], np.arange(n))
+
+
+def test_a_row_is_the_plan_with_what_each_look_detects() -> None:
+    planner = planner_for("open")
+    looks, n, whole = row_of(planner)
+    mass, tree = planner._chart.mass.copy(), planner._tree
+    for cell in tree.path[:HOLD]:
+        mass[cell] *= 1.0 - 0.9
+    assert whole == pytest.approx(mass.sum(), rel=1e-9)
+    for place, cell in enumerate(tree.path[HOLD : tree.mark[plans.LENGTH]], start=1):
+        assert (looks.row[place], looks.col[place]) == divmod(cell, looks.cols)
+        assert looks.worth[place] == pytest.approx(0.9 * mass[cell])
+        mass[cell] *= 1.0 - 0.9
+    assert place == n - 1
+
+
+def test_neighbours_are_the_looks_around() -> None:
+    looks, n, _ = row_of(planner_for("walls"))
+    apart = np.maximum(
+        np.abs(looks.row[:n, None] - looks.row[None, :n]), np.abs(looks.col[:n, None] - looks.col[None, :n])
+    )
+    for look in range(n):
+        near = set(looks.near[look, : looks.nears[look]].tolist())
+        around = set(np.flatnonzero(apart[look] <= 1).tolist()) - {0, look}
+        assert near == around if len(around) < order.NEAR else near < around
+    assert not looks.last.any()
+
+
+@pytest.mark.parametrize("name", sorted(MAPS))
+def test_annealing_shortens_the_expected_time_by_what_it_says(name: str) -> None:
+    looks, n, whole = row_of(planner_for(name))
+    before = expected_time(looks, n, whole)
+    delay = order.anneal(n, whole, looks, np.array([7], dtype=np.uint64), 400_000, 0.05, 0.001)
+    assert delay < -0.003 * before
+    assert expected_time(looks, n, whole) == pytest.approx(before + delay, rel=1e-9)
+
+
+def test_a_hot_row_gets_worse_and_a_cold_one_never() -> None:
+    looks, n, whole = row_of(planner_for("open"))
+    random = np.array([7], dtype=np.uint64)
+    before = expected_time(looks, n, whole)
+    assert order.anneal(n, whole, looks, random, 30_000, 20.0, 10.0) > 0.0
+    worst = expected_time(looks, n, whole)
+    assert worst > before
+    assert all(order.anneal(n, whole, looks, random, 2_000, 1e-12, 1e-12) <= 0.0 for _ in range(50))
+    assert expected_time(looks, n, whole) < worst
+
+
+@pytest.mark.parametrize("name", sorted(MAPS))
+def test_a_laid_row_is_flyable_and_worth_at_least_what_its_sums_say(name: str) -> None:
+    planner = planner_on(MAPS[name])
+    tree, annealer = planner._tree, planner._thinking._annealer
+    assert annealer is not None
+    held, before = tree.path[:HOLD].copy(), float(tree.value[plans.EXPECTED])
+    annealer.begin(planner._pose, tree, HOLD, 40, 0.05)
+    while not annealer.go_on(tree):
+        assert annealer.is_open
+    assert annealer.end(planner._pose, tree)
+    assert not annealer.is_open
+    assert tree.value[plans.EXPECTED] < 0.998 * before
+    assert plans.evaluate(*planner._pose, planner._chart, tree, planner._rules) == pytest.approx(
+        tree.value[plans.EXPECTED], rel=1e-9
+    )
+    np.testing.assert_array_equal(tree.path[:HOLD], held)
+    assert tree.mark[plans.LENGTH] == HORIZON
+    cells = np.stack(np.divmod(np.concatenate([[5 * 200 + 5], tree.path[:HORIZON]]), 200), axis=1)
+    assert (np.abs(np.diff(cells, axis=0)).sum(axis=1) == 1).all()
+    if name == "walls":
+        assert WALLS[cells[:, 0], cells[:, 1]].all()
+
+
+def test_a_row_that_is_no_better_leaves_the_plan_alone() -> None:
+    planner = planner_on(None)
+    tree, annealer = planner._tree, planner._thinking._annealer
+    assert annealer is not None
+    path, value = tree.path.copy(), tree.value.copy()
+    annealer.begin(planner._pose, tree, HOLD, 1, 0.05)
+    order.anneal(annealer._n, annealer._whole, annealer._looks, planner._random, 20_000, 20.0, 20.0)
+    assert not annealer.end(planner._pose, tree)
+    np.testing.assert_array_equal(tree.path, path)
+    np.testing.assert_array_equal(tree.value, value)
+
+
+def test_a_round_is_over_when_the_drone_is_where_it_begins() -> None:
+    belief, rng, state = Belief(PRIOR), np.random.default_rng(0), SearchState((5, 5))
+    planner = SweepPlanner(SweepSettings(iterations=3, patience=1, horizon=700), fov=POINT)
+    rounds = []
+    for _ in range(2 * AHEAD):
+        state = after(state, planner.plan(belief, state, rng).path[0])
+        belief.observe([state.cell], False, 0.9, 1.0)
+        thinking = planner._thinking
+        assert thinking._annealer is not None
+        if thinking.rough and thinking._annealer.is_open:
+            rounds.append((thinking._annealer.hold, thinking._annealer._made))
+        if rounds and not thinking.rough:
+            break
+    assert not planner._thinking.rough
+    assert len({hold for hold, _ in rounds}) == 1
+    assert 3 * AHEAD - 20 < rounds[-1][1] < 3 * AHEAD  # far from the most that a round may have
+
+
+def test_a_wider_view_is_not_annealed() -> None:
+    planner = SweepPlanner(SweepSettings(iterations=30, patience=5, horizon=200), fov=FieldOfView.donut())
+    planner.plan(Belief(hill((40, 40), (20, 25), 4.0)), SearchState((5, 5)), np.random.default_rng(0))
+    assert planner._thinking._annealer is None
+    assert not planner._thinking.rough

@@ -328,7 +328,8 @@ def anneal(
             turned = from_first != behind
             delay = delay_of_shift(first, last, to, turned, n, whole, looks)
         if delay > -1e-15:
-            worse = delay / (temperature * (whole - looks.worths[min(first, to)]) + 1e-300)
+            left = max(0.0, whole - looks.worths[min(first, to)])
+            worse = delay / (temperature * left + 1e-300)
             if worse > 8.0 or np.exp(-worse) < draw(state):
                 continue
         rearrange(first, last, to, turned, n, looks)

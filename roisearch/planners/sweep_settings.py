@@ -11,9 +11,10 @@ class SweepSettings:
     """What can be set about the search.
 
     Attributes:
-        iterations: simulations a decision, at most; None for as many as the deadline allows.
-        patience: simulations in a row without a better plan, over the decisions, after which the search goes on
-            from another start, as a challenger of the plan (`roisearch.planners.challenge`).
+        iterations: of a decision, at most; None for as many as the deadline allows. One is a simulation of the tree
+            search, or as much annealing as takes about as long (`roisearch.planners.thinking`).
+        patience: simulations in a row without a better plan, over the decisions, after which the plan is annealed and
+            the search goes on from another start, as a challenger of the plan.
         restarts: challengers in a row that do not become the plan, after which it is flown without thinking,
             until something is seen that it did not expect. When the plan is carried on, thinking resumes for the
             part of this and of the patience that it leaves undetected.

@@ -155,6 +155,13 @@ def test_a_hot_row_gets_worse_and_a_cold_one_never() -> None:
     assert expected_time(looks, n, whole) < worst
 
 
+def test_where_nothing_is_left_to_detect_no_delay_is_cheap() -> None:
+    looks, n, _ = row_of(planner_for("open"))
+    whole = float(looks.worths[n - 1]) * (1.0 - 1e-12)  # as rounding may leave it for a perfect detector
+    random = np.array([7], dtype=np.uint64)
+    assert all(order.anneal(n, whole, looks, random, 2_000, 1e-12, 1e-12) <= 0.0 for _ in range(50))
+
+
 @pytest.mark.parametrize("name", sorted(MAPS))
 def test_a_laid_row_is_flyable_and_worth_at_least_what_its_sums_say(name: str) -> None:
     planner = planner_on(MAPS[name])

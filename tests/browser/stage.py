@@ -67,7 +67,7 @@ class Stage:
     def _start(self, *words: str) -> Process:
         where = ("--http", f"127.0.0.1:{self.port}", "--speedup", str(self._speedup))
         service = self._stack.enter_context(running("service", *words, *where))
-        service.wait_for(r"listening on http://\S+")
+        service.wait_for(r"listening on http://\S+", 300.0)  # the planner may have to be compiled
         return service
 
     @property

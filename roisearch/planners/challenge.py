@@ -73,6 +73,6 @@ class Challenger:
         self.lost += self.is_open
         self.is_open = False
 
-    def forget(self, lost: int = 0) -> None:
+    def forget(self, lost: int) -> None:
         """The plan has changed: there is no challenger any more, and at most `lost` count as lost against it."""
         self.is_open, self.lost = False, min(self.lost, lost)

@@ -121,7 +121,10 @@ class Thinking:
         """The challenger is done: it becomes the plan, or is forgotten."""
         if self.challenger.beats(self.tree):
             self.tree = self.challenger.replace(self.tree)
-            self.rough = self._annealer is not None  # from nearer ahead than where it left the plan
+            if self._annealer is None:
+                self.stale = 0  # it may have won in the midst of its search
+            else:
+                self.rough = True  # from nearer ahead than where it left the plan
         else:
             self.challenger.lose()
 

@@ -119,3 +119,17 @@ def test_who_wins_keeps_what_was_thought_of_the_other_actions() -> None:
     assert planner._tree is not before
     assert visits[4:-1].sum() > 0
     assert (planner._tree.stats[0, :, plans.N_A] >= visits).all()
+
+
+@pytest.mark.parametrize("fov", [POINT, FieldOfView.donut()])
+def test_who_wins_is_thought_about_further(fov: FieldOfView) -> None:
+    planner = SweepPlanner(SweepSettings(iterations=0, patience=10, horizon=200), fov=fov)
+    planner.plan(Belief(HILLS), SearchState((5, 5)), np.random.default_rng(0))
+    thinking = planner._thinking
+    thinking.stale, thinking.rough = 10, False
+    thinking.iterate(planner._pose)
+    winner = thinking.challenger.tree
+    winner.value[plans.EXPECTED] *= 0.5
+    thinking._judge()
+    assert thinking.tree is winner
+    assert (thinking.stale, thinking.rough) == ((10, True) if fov.is_point else (0, False))

@@ -24,26 +24,36 @@ def log_as_it_was() -> Iterator[None]:
     log.setLevel(level)
 
 
-FLIGHTS = (
-    "tests/browser/",
+FLIGHTS = ("tests/browser/", "tests/integration/")
+"""Files whose tests keep time with other processes: one worker does them one at a time, whatever the other computes."""
+LATE_FLIGHTS = (
     "tests/conformance/test_over_sockets",
-    "tests/integration/",
+    "tests/integration/test_faults_pilot",
+    "tests/integration/test_search",
     "tests/service/test_mavlink_vehicle",
     "tests/sim/test_autopilot_mav",
     "tests/sim/test_bench",
 )
-"""Files whose tests keep time with other processes: one at a time, whatever the other worker computes meanwhile."""
+"""Those that the other worker does when it has computed everything: by then all kernels are compiled, and two flights
+at a time do not disturb each other."""
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With `-n 2`, one worker flies and the other takes a file at a time."""
+    """With `-n 2`, one worker flies and the other takes a file at a time, and flies at last."""
     from xdist.scheduler import LoadScopeScheduling
 
     class OneFlies(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.partition("::")[0]
+            if file.startswith(LATE_FLIGHTS):
+                return "late"
             return "flights" if file.startswith(FLIGHTS) else file
+
+        def _assign_work_unit(self, node: Any) -> None:
+            if "late" in self.workqueue:
+                self.workqueue.move_to_end("late")
+            super()._assign_work_unit(node)
 
     return OneFlies(config, log)
 

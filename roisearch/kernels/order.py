@@ -35,10 +35,15 @@ Ints32 = NDArray[np.int32]
 
 NEAR = 24
 """Most neighbours that are known of a look."""
+AROUND = ((-1, 0), (0, 1), (1, 0), (0, -1), (0, 0), (-1, -1), (-1, 1), (1, 1), (1, -1))
+"""Rows down and columns to the right of the cells whose looks are neighbours, those a step away first."""
 LENGTHS = 1024
 """Entries of the table that lengths of stretches are drawn from."""
-TURNS = 0.15
-"""Part of the proposals that are turns; the others are shifts."""
+TURNS, CLOSED = 0.1, 0.9
+"""Part of the proposals that are turns, and with those that shift what lies between two neighbours; the other shifts
+are of any stretch."""
+BESIDE = 0.9
+"""Part of the neighbours in proposals that are a step away, where there are such."""
 WAY = 12
 """Longest way between two looks where there are obstacles."""
 STRIDE = 1024
@@ -53,10 +58,10 @@ class Looks(NamedTuple):
     By place: `number` int32 [n], the look made there; row, col: int32 [n], worth: float [n], of that look; step:
     float [n], when it is made, place 0 at step 0; worths, moments: float [n], sums of worth and of worth * step up to
     that place. By look: `place` int32 [n]; action: int [n], what it belongs to in the plan; near: int32 [n, NEAR],
-    looks at cells beside, crossing or at the same cell, `nears` int32 [n] of them. spare_number, spare_row, spare_col,
-    spare_worth [n]: room for a stretch. last: int32 [cells], the last look at a cell while neighbours are sought, 0 for
-    none; before: int32 [n], the look at the same cell before. lengths: int [LENGTHS], to draw from. rows, cols, legal,
-    is_open: as in `Chart`.
+    looks at the cells AROUND, `nears` int32 [n] of them, and of these the first `besides` int32 [n] a step away.
+    spare_number, spare_row, spare_col, spare_worth [n]: room for a stretch. last: int32 [cells], the last look at a
+    cell while neighbours are sought, 0 for none; before: int32 [n], the look at the same cell before. lengths: int
+    [LENGTHS], to draw from. rows, cols, legal, is_open: as in `Chart`.
     """
 
     rows: int
@@ -74,6 +79,7 @@ class Looks(NamedTuple):
     action: Ints
     near: Ints32
     nears: Ints32
+    besides: Ints32
     spare_number: Ints32
     spare_row: Ints32
     spare_col: Ints32
@@ -122,17 +128,17 @@ def meet(n: int, looks: Looks) -> None:
         looks.last[cell] = i
     for i in range(n):
         found = 0
-        for down in range(-1, 2):
-            for right in range(-1, 2):
-                row, col = looks.row[i] + down, looks.col[i] + right
-                if not (0 <= row < looks.rows and 0 <= col < looks.cols):
-                    continue
+        for way in range(9):
+            row, col = looks.row[i] + AROUND[way][0], looks.col[i] + AROUND[way][1]
+            if 0 <= row < looks.rows and 0 <= col < looks.cols:
                 other = looks.last[row * looks.cols + col]
                 while other > 0 and found < NEAR:
                     if other != i:
                         looks.near[i, found] = other
                         found += 1
                     other = looks.before[other]
+            if way < 4:
+                looks.besides[i] = found
         looks.nears[i] = found
     for i in range(1, n):
         looks.last[looks.row[i] * looks.cols + looks.col[i]] = 0
@@ -277,6 +283,17 @@ def rearrange(first: int, last: int, to: int, turned: bool, n: int, looks: Looks
             looks.moments[i] += moment + later * (looks.worths[i] - looks.worths[done])
 
 
+@inlined
+def near_place(place: int, state: NDArray[np.uint64], looks: Looks) -> int:
+    """The place of a look near that of `place`, BESIDE of the time a step away; the place itself if there is none."""
+    look = looks.number[place]
+    choice = draw(state) / BESIDE
+    found = looks.besides[look]
+    if choice >= 1.0 or found == 0:
+        choice, found = draw(state), looks.nears[look]
+    return int(looks.place[looks.near[look, int(choice * found)]]) if found > 0 else place
+
+
 @kernel
 def anneal(
     n: int,
@@ -296,29 +313,26 @@ def anneal(
         if spent >= cooled:
             temperature *= cooling
             cooled += STRIDE
-        first = 1 + int(draw(state) * (n - 1))
+        place = draw(state)
+        place = int(place * np.sqrt(place) * (n - 1))  # what is done soon matters most
         kind = draw(state)
         if kind < TURNS:
-            anchor, last, to, turned = looks.number[first - 1], first, first - 1, True
-        else:
-            last = first + looks.lengths[int(draw(state) * LENGTHS)] - 1
-            if last + 1 >= n:
-                continue
-            from_first = kind < TURNS + 0.5 * (1.0 - TURNS)
-            anchor = looks.number[first] if from_first else looks.number[last]
-        found = looks.nears[anchor]
-        if found == 0:
-            continue
-        choice = draw(state) * found
-        other = looks.place[looks.near[anchor, int(choice)]]
-        if kind < TURNS:
-            last = other
+            first, last, to, turned = place + 1, near_place(place, state, looks), place, True
             if last <= first:
                 continue
             delay = delay_of_turn(first, last, n, whole, looks)
         else:
-            to = other
-            behind = choice - int(choice) < 0.5
+            if kind < CLOSED:
+                other = near_place(place, state, looks)
+                first, last = min(place, other) + 1, max(place, other) - 1
+            else:
+                first = place + 1
+                last = place + looks.lengths[int(draw(state) * LENGTHS)]
+            if last < first or last + 1 >= n:
+                continue
+            from_first = draw(state) < 0.5
+            behind = draw(state) < 0.5
+            to = near_place(first if from_first else last, state, looks)
             if first <= to <= last:
                 continue
             if not behind:

@@ -8,6 +8,7 @@ whichever is further: when the drone is there, the round is over.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roisearch.kernels import order
 from roisearch.kernels.plans import LENGTH, NOW, Desk, Tree
@@ -30,17 +31,18 @@ class Annealer:
 
     def __init__(self, horizon: int, desk: Desk) -> None:
         n = horizon + 2
-        numbers = [np.zeros(n, dtype=np.int32) for _ in range(9)]
-        sums = [np.zeros(n) for _ in range(5)]
         share = np.arange(order.LENGTHS) / order.LENGTHS
         chart = desk.chart
+
+        def counts(*shape: int) -> NDArray[np.int32]:
+            return np.zeros(shape, dtype=np.int32)
+
         self._looks = order.Looks(
             rows=chart.rows, cols=chart.cols, legal=chart.legal, is_open=chart.is_open,
-            number=numbers[0], row=numbers[1], col=numbers[2], worth=sums[0], step=sums[1], worths=sums[2],
-            moments=sums[3], place=numbers[3], action=np.zeros(n, dtype=np.int64),
-            near=np.zeros((n, order.NEAR), dtype=np.int32), nears=numbers[4], spare_number=numbers[5],
-            spare_row=numbers[6], spare_col=numbers[7], spare_worth=sums[4],
-            last=np.zeros(chart.mass.size, dtype=np.int32), before=numbers[8],
+            number=counts(n), row=counts(n), col=counts(n), worth=np.zeros(n), step=np.zeros(n), worths=np.zeros(n),
+            moments=np.zeros(n), place=counts(n), action=np.zeros(n, dtype=np.int64), near=counts(n, order.NEAR),
+            nears=counts(n), besides=counts(n), spare_number=counts(n), spare_row=counts(n), spare_col=counts(n),
+            spare_worth=np.zeros(n), last=counts(chart.mass.size), before=counts(n),
             lengths=(LONGEST**share).astype(np.int64),
         )  # fmt: skip
         self._proposals = PROPOSALS * horizon

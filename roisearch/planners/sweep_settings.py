@@ -34,8 +34,8 @@ class SweepSettings:
 
     iterations: int | None = 4
     patience: int = 60
-    restarts: int = 20
-    least: float = 0.1
+    restarts: int = 8
+    least: float = 0.01
     horizon: int = 4000
     explore: float = 1.0
     keep: float = 0.75

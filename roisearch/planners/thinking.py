@@ -17,15 +17,15 @@ from roisearch.planners.sweep_settings import SweepSettings
 
 Pose = tuple[int, int, int]
 
-AHEAD = 64
-"""Steps ahead of the drone from which on the plan is annealed."""
+SOON, AHEAD = 8, 64
+"""Steps ahead of the drone from which on a plan is annealed, at first and at most: twice as many in each round."""
 PLAN_ROUND, CHALLENGER_ROUND, COPY_ROUND = 512, 256, 384
 """Iterations of a round of annealing, at most: of the plan, of a challenger that was searched, of a copied one."""
-WARM, HOT = 0.05, 0.2
+WARM, HOT = 0.1, 0.2
 """Temperatures, in steps, at which a round begins: on what the search made, and to leave an annealed plan."""
-COPIES = 0.7
+COPIES = 0.3
 """Part of the challengers that begin as copies of the plan."""
-PROMISING = 1.01
+PROMISING = 1.02
 """A searched challenger is annealed when its expected time is below so many times the plan's, which is annealed."""
 
 
@@ -52,6 +52,7 @@ class Thinking:
         self._desk = desk
         self._settings = settings
         self._annealer = Annealer(settings.horizon, desk) if anneals else None
+        self._ahead = SOON
 
     def plans(self) -> list[Tree]:
         """The plan, and the challenger's when there is one."""
@@ -79,10 +80,11 @@ class Thinking:
     def _smooth(self, pose: Pose, annealer: Annealer) -> None:
         """Anneal the plan, which the search has just left."""
         if not annealer.is_open:
-            annealer.begin(pose, self.tree, int(self.tree.mark[NOW]) + AHEAD, PLAN_ROUND, WARM)
+            annealer.begin(pose, self.tree, int(self.tree.mark[NOW]) + self._ahead, PLAN_ROUND, WARM)
+            self._ahead = min(2 * self._ahead, AHEAD)
         elif annealer.go_on(self.tree):
             annealer.end(pose, self.tree)
-            self.rough = False
+            self.rough = self._ahead < AHEAD
 
     def _challenge(self, pose: Pose) -> None:
         """Begin a challenger, or search or anneal it; it is judged when that is done, or when its search has won."""
@@ -143,7 +145,7 @@ class Thinking:
 
     def replanned(self) -> None:
         """The plan is another one."""
-        self.stale = 0
+        self.stale, self._ahead = 0, SOON
         self._forget(0)
 
     def _forget(self, lost: int) -> None:

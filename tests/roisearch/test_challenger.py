@@ -94,7 +94,7 @@ def test_nothing_before_the_held_place_is_tried() -> None:
 def test_a_hit_forgets_the_challenger() -> None:
     belief, rng, state = Belief(HILLS), np.random.default_rng(4), SearchState((5, 5))
     planner = restless()
-    for _ in range(50):
+    for _ in range(200):
         state = after(state, planner.plan(belief, state, rng).path[0])
         belief.observe([state.cell], False, 0.9, 0.98)
         if planner._thinking.challenger.is_open:

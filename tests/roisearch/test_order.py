@@ -15,7 +15,7 @@ from roisearch.kernels import order, plans
 from roisearch.kernels.order import Looks
 from roisearch.planners.sweep import SweepPlanner
 from roisearch.planners.sweep_settings import SweepSettings
-from roisearch.planners.thinking import AHEAD
+from roisearch.planners.thinking import AHEAD, SOON
 from sim.scenario import paper_prior
 
 from .test_sweep_planner import after, hill
@@ -129,9 +129,11 @@ def test_neighbours_are_the_looks_around() -> None:
         np.abs(looks.row[:n, None] - looks.row[None, :n]), np.abs(looks.col[:n, None] - looks.col[None, :n])
     )
     for look in range(n):
-        near = set(looks.near[look, : looks.nears[look]].tolist())
+        near = looks.near[look, : looks.nears[look]].tolist()
         around = set(np.flatnonzero(apart[look] <= 1).tolist()) - {0, look}
-        assert near == around if len(around) < order.NEAR else near < around
+        assert set(near) == around if len(around) < order.NEAR else set(near) < around
+        steps = [abs(looks.row[i] - looks.row[look]) + abs(looks.col[i] - looks.col[look]) for i in near]
+        assert [s == 1 for s in steps] == [i < looks.besides[look] for i in range(len(near))]
     assert not looks.last.any()
 
 
@@ -197,22 +199,26 @@ def test_a_row_that_is_no_better_leaves_the_plan_alone() -> None:
     np.testing.assert_array_equal(tree.value, value)
 
 
-def test_a_round_is_over_when_the_drone_is_where_it_begins() -> None:
+def test_rounds_begin_further_and_further_ahead_and_are_over_when_the_drone_is_there() -> None:
     belief, rng, state = Belief(PRIOR), np.random.default_rng(0), SearchState((5, 5))
     planner = SweepPlanner(SweepSettings(iterations=3, patience=1, horizon=700), fov=POINT)
-    rounds = []
+    ahead: dict[int, int] = {}
+    made: dict[int, int] = {}
     for _ in range(2 * AHEAD):
         state = after(state, planner.plan(belief, state, rng).path[0])
         belief.observe([state.cell], False, 0.9, 1.0)
         thinking = planner._thinking
-        assert thinking._annealer is not None
-        if thinking.rough and thinking._annealer.is_open:
-            rounds.append((thinking._annealer.hold, thinking._annealer._made))
-        if rounds and not thinking.rough:
+        annealer = thinking._annealer
+        assert annealer is not None
+        if thinking.rough and annealer.is_open:
+            ahead.setdefault(annealer.hold, annealer.hold - int(planner._tree.mark[plans.NOW]))
+            made[annealer.hold] = annealer._made
+        if made and not thinking.rough:
             break
     assert not planner._thinking.rough
-    assert len({hold for hold, _ in rounds}) == 1
-    assert 3 * AHEAD - 20 < rounds[-1][1] < 3 * AHEAD  # far from the most that a round may have
+    assert list(ahead.values()) == [SOON, 2 * SOON, 4 * SOON]
+    for steps, iterations in zip(ahead.values(), made.values(), strict=True):
+        assert 3 * steps - 9 < iterations < 3 * steps  # far from the most that a round may have
 
 
 def test_a_wider_view_is_not_annealed() -> None:

@@ -33,7 +33,7 @@ from sim.ruler import detection_curve
 from sim.scenario import PAPER_START, PAPER_STEPS, paper_prior
 
 P_TP = 0.9
-VARIANTS = "iterations=0 iterations=1,horizon=3000 iterations=8,horizon=5000"
+VARIANTS = "iterations=0 iterations=1,horizon=3000 iterations=16,horizon=5000"
 SHARES = (50.0, 95.0, 99.9, 100.0)
 """Percentiles of the time that a decision takes; the last is the slowest."""
 KEY = ("variant", "fov", "p_tn", "equal", "deadline_ms", "stop_below", "seed", "draw")

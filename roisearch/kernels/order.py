@@ -7,9 +7,12 @@ Sums of w and of w * t along the row tell what two kinds of move change without 
 - a *turn*: a stretch of looks is made in the opposite order (2-opt);
 - a *shift*: a stretch is made elsewhere, in the same order or in the opposite one (or-opt).
 
-Both join looks that are near each other on the map. A move that makes the plan better is made; one that makes it
-worse is made with probability exp(-delay / temperature), and the temperature falls. Delays are counted in steps for
-everything that is then undetected, so that one temperature fits the start and the end of a search.
+Both join looks that are near each other on the map. Most shifts are of what lies between two neighbours, so that the
+gap that they leave closes: nearly all others make the way longer, and are not taken.
+
+A move that makes the plan better is made; one that makes it worse is made with probability exp(-delay / temperature),
+and the temperature falls. Delays are counted in steps for everything that is then undetected, so that one temperature
+fits the start and the end of a search.
 
 A look that comes before another one at the same cell is worth more than it was behind it, and a way between two looks
 leads over cells that are looked at as well. Neither is counted here, so a plan is at least as good as its sums say.
@@ -40,8 +43,8 @@ AROUND = ((-1, 0), (0, 1), (1, 0), (0, -1), (0, 0), (-1, -1), (-1, 1), (1, 1), (
 LENGTHS = 1024
 """Entries of the table that lengths of stretches are drawn from."""
 TURNS, CLOSED = 0.1, 0.9
-"""Part of the proposals that are turns, and with those that shift what lies between two neighbours; the other shifts
-are of any stretch."""
+"""Part of the proposals that are turns, and part that are turns or shifts of what lies between two neighbours; the
+others are shifts of any stretch."""
 BESIDE = 0.9
 """Part of the neighbours in proposals that are a step away, where there are such."""
 WAY = 12

@@ -18,7 +18,7 @@ PROPOSALS = 8
 COLD = 0.001
 """Temperature at the end of a round, in steps."""
 LONGEST = 1000
-"""Most looks that are shifted at once."""
+"""Most looks in a stretch that is drawn by its length."""
 
 
 class Annealer:

@@ -316,8 +316,8 @@ def anneal(
         if spent >= cooled:
             temperature *= cooling
             cooled += STRIDE
-        place = draw(state)
-        place = int(place * np.sqrt(place) * (n - 1))  # what is done soon matters most
+        share = draw(state)
+        place = int(share * np.sqrt(share) * (n - 1))  # what is done soon matters most
         kind = draw(state)
         if kind < TURNS:
             first, last, to, turned = place + 1, near_place(place, state, looks), place, True

@@ -146,6 +146,19 @@ def test_annealing_shortens_the_expected_time_by_what_it_says(name: str) -> None
     assert expected_time(looks, n, whole) == pytest.approx(before + delay, rel=1e-9)
 
 
+@pytest.mark.parametrize("name", sorted(MAPS))
+def test_what_is_proposed_is_likely_to_be_taken(name: str) -> None:
+    """Moves of any kind are legal, and told rightly: joins at the wrong ends would only gain less in the same time."""
+    gains = []
+    for seed in range(20):
+        looks, n, whole = row_of(planner_for(name))
+        before = expected_time(looks, n, whole)
+        gains.append(
+            -order.anneal(n, whole, looks, np.array([seed], dtype=np.uint64), 400_000, 0.05, 0.001) / before
+        )
+    assert np.mean(gains) > 0.008
+
+
 def test_a_hot_row_gets_worse_and_a_cold_one_never() -> None:
     looks, n, whole = row_of(planner_for("open"))
     random = np.array([7], dtype=np.uint64)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,24 +14,67 @@ from roisearch.kernels.looks import (
     CERTAIN,
     OK,
     OUT_OF_MAP,
+    WEIGHTS,
     apply_looks,
     sum_up,
     tree_offsets,
 )
+from roisearch.walk import Drift, Walk, Ways
 
-if TYPE_CHECKING:
-    from roisearch.forest import Forest, ForestSums
-
-_MAGIC = b"roisearch-belief-1\n"
-_KEPT_FORESTS = 4
+_KEPT = 4
+"""Followers that a belief keeps, beside those that last."""
 _TINY, _HUGE = 2.0**-500, 2.0**500
+
+
+class Follower(Protocol):
+    """What is kept up to date with one belief: sums, counts, lists of changes.
+
+    Attributes:
+        subject: what it was begun from.
+        lasts: whether it knows what cannot be had from the weights anew.
+    """
+
+    @property
+    def subject(self) -> object: ...
+
+    @property
+    def lasts(self) -> bool: ...
+
+    def touch(self, cells: NDArray[np.int64], hits: NDArray[np.bool_], weights: NDArray[np.float64]) -> None:
+        """There were looks at `cells` [k, 2], and `weights` [cells] are those after; hits: bool [k] or [1]."""
+        ...
+
+    def renew(self, weights: NDArray[np.float64], factor: float) -> None:
+        """All weights may have changed, and what was known of them before is to be multiplied by `factor`."""
+        ...
+
+    def drifted(self, weights: NDArray[np.float64], ways: Ways, ticks: int) -> None:
+        """The target walked for some ticks, and `weights` [cells] are those after."""
+        ...
+
+    def copy(self) -> Follower:
+        """Another one, for a copy of the belief."""
+        ...
+
+
+_F = TypeVar("_F", bound=Follower)
+_Begun = TypeVar("_Begun", bound=Follower, covariant=True)
+
+
+class Subject(Protocol[_Begun]):
+    """What a belief can be asked to keep."""
+
+    def begin(self, weights: NDArray[np.float64], shape: tuple[int, int]) -> _Begun:
+        """A follower for a belief of these weights [cells] on a map of `shape`."""
+        ...
 
 
 class Belief:
     """The probability of each cell, and of 'not in the area at all'.
 
     A look multiplies the odds of the looked-at cell by p_tp / (1 - p_tn) on a hit and by (1 - p_tp) / p_tn
-    on a miss (Bayes' rule for one static target, the paper's section 'Belief Update'), and of nothing else.
+    on a miss (Bayes' rule, the paper's section 'Belief Update'), and of nothing else. Where a target that walks
+    may have gone between looks, `drift` tells.
     So the weights are kept unnormalised beside their total, and an observation of k cells costs O(k log
     cells).
 
@@ -39,6 +82,7 @@ class Belief:
         prior: float [rows, cols], finite, not negative; scaled so that the cells hold 1 - outside together.
         searchable: bool [rows, cols]; where False, the target cannot be and the prior counts as zero.
         outside: probability that the target is not in the area, 0 <= outside < 1.
+        walk: how the target moves as `drift` lets time pass, over searchable cells only; None: it stands still.
 
     Attributes:
         hits: how many hits it has taken in; planners compare it to know that the picture has changed.
@@ -48,13 +92,19 @@ class Belief:
     """
 
     def __init__(
-        self, prior: ArrayLike, *, searchable: ArrayLike | None = None, outside: float = 0.0
+        self,
+        prior: ArrayLike,
+        *,
+        searchable: ArrayLike | None = None,
+        outside: float = 0.0,
+        walk: Walk | None = None,
     ) -> None:
         weights = np.array(prior, dtype=np.float64, order="C")
         if weights.ndim != 2 or weights.size == 0:
             raise ValueError(f"the prior must be a map of rows and columns, not of shape {weights.shape}")
         if not np.isfinite(weights).all() or (weights < 0.0).any():
             raise ValueError("the prior must be finite and not negative in every cell")
+        mask: NDArray[np.bool_] | None = None
         if searchable is not None:
             mask = np.asarray(searchable, dtype=bool)
             if mask.shape != weights.shape:
@@ -68,19 +118,24 @@ class Belief:
         weights /= peak  # so that no sum overflows
         weights *= (1.0 - outside) / float(weights.sum())
         self._shape: tuple[int, int] = (weights.shape[0], weights.shape[1])
-        self._take(weights.ravel(), float(outside))
+        drift = None if walk is None else Drift(walk.ways(self._shape, mask))
+        self._take(weights.ravel(), float(outside), drift)
 
-    def _take(self, weights: NDArray[np.float64], outside: float) -> None:
+    def _take(self, weights: NDArray[np.float64], outside: float, drift: Drift | None) -> None:
         self._weights = weights
-        self._first = weights.copy()  # never written: all copies of this belief share it
-        self._rescaled = 1.0  # what the weights were multiplied with since
-        self._tally = np.zeros((weights.size, 2), dtype=np.int16)
         self._outside = outside
         self._offsets = tree_offsets(weights.size)
         self._sums = np.empty(int(self._offsets[-1]))
         sum_up(weights, self._sums, self._offsets)
-        self._forests: list[ForestSums] = []
+        self._followers: list[Follower] = []
+        self._drift = drift
         self.hits = 0
+        self._pack()
+
+    def _pack(self) -> None:
+        self._parcel = WEIGHTS.pack(
+            weights=self._weights, sums=self._sums, offsets=self._offsets, cols=self._shape[1]
+        )
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -118,14 +173,6 @@ class Belief:
         mass: NDArray[np.float64] = self._weights[at[:, 0] * self._shape[1] + at[:, 1]] / self.total
         return mass
 
-    def contradicted(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
-        """How many hits at each of `cells` [k], flat indices, the misses at the same cell outweigh, int [k].
-
-        None while the cell is more probable, beside the others, than before all looks at it.
-        """
-        outweighed = self._weights[cells] <= self._first[cells] * (self._rescaled * (1.0 + 1e-9))
-        return np.where(outweighed, self._tally[cells].min(axis=1), 0).astype(np.int64)
-
     def entropy(self) -> float:
         """How uncertain the belief is, in bits, 'not in the area' being one more place."""
         p = self._weights[self._weights > 0.0] / self.total
@@ -154,26 +201,55 @@ class Belief:
         hit = _flags(hits, k)
         tp = _numbers(p_tp, k, "p_tp")
         tn = _numbers(p_tn, k, "p_tn")
-        status, number = apply_looks(
-            self._weights,
-            self._sums,
-            self._offsets,
-            self._tally,
-            self._outside,
-            self._shape[1],
-            at,
-            hit,
-            tp,
-            tn,
-        )
+        status, number = apply_looks(self._parcel.address, self._outside, at, hit, tp, tn)
         if status != OK:
             self._explain(status, number, at, hit, tp, tn)
             return
         self.hits += number
-        for kept in self._forests:
-            kept.touch(at, self._weights)
+        for follower in self._followers:
+            follower.touch(at, hit, self._weights)
         if not _TINY < self._sums[-1] + self._outside < _HUGE:
             self._rescale()
+
+    @property
+    def walks(self) -> Walk | None:
+        """How the target moves; None: it stands still."""
+        return None if self._drift is None else self._drift.ways.walk
+
+    def drift(self, seconds: float) -> int:
+        """Let time pass: a target that walks walks on, and one that stands still costs nothing.
+
+        The walk is reckoned in ticks (`Walk.tick_us`), and what is left of one waits for the next call: any two ways to
+        the same time, in whole microseconds, give the same weights to the last bit. The mass on the map and that
+        outside stay as they are.
+
+        Returns:
+            How many ticks were reckoned; 0: no weight has changed.
+
+        Raises:
+            ValueError: when `seconds` is negative, not a number, or more than `walk.MOST_S`.
+        """
+        if self._drift is None:
+            return 0
+        ticks = self._drift.wait(seconds)
+        if ticks:
+            self._drift.ways.go(self._weights, self._drift.going, ticks)
+            sum_up(self._weights, self._sums, self._offsets)
+            for follower in self._followers:
+                follower.drifted(self._weights, self._drift.ways, ticks)
+        return ticks
+
+    @property
+    def since_tick_s(self) -> float:
+        """Seconds that wait to be reckoned: what is told of a moment before those comes too late for this belief."""
+        return 0.0 if self._drift is None else self._drift.waiting_us * 1e-6
+
+    def walking(self) -> NDArray[np.float64]:
+        """The probability that the target is in each cell and has not stopped for good, a new array [rows, cols]."""
+        if self._drift is None:
+            return np.zeros(self._shape)
+        there = self.probability()
+        return there * self._drift.going.reshape(self._shape) if self._drift.going.size else there
 
     def _explain(
         self,
@@ -217,70 +293,62 @@ class Belief:
         self._weights[int(there[0, 0]) * self._shape[1] + int(there[0, 1])] = 1.0
         self._outside = 0.0
         self.hits = after.hits
-        self._renew()
+        self._renew(1.0)
 
     def _rescale(self) -> None:
         """Multiply all weights by a power of two (exact) before they run out of exponent."""
         factor = 2.0 ** -round(float(np.log2(self.total)))
         self._weights *= factor
-        self._rescaled *= factor
         self._outside *= factor
-        self._renew()
+        self._renew(factor)
 
-    def _renew(self) -> None:
+    def _renew(self, factor: float) -> None:
         sum_up(self._weights, self._sums, self._offsets)
-        for forest in self._forests:
-            forest.grow(self._weights)
+        for follower in self._followers:
+            follower.renew(self._weights, factor)
 
-    def sums_of(self, forest: Forest) -> ForestSums:
-        """Sum and peak of each region of `forest`, from now on kept up to date by every observation."""
-        for kept in self._forests:
-            if kept.forest is forest:
-                return kept
-        kept = forest.sums(self._weights)
-        self._forests = [kept, *self._forests[: _KEPT_FORESTS - 1]]
-        return kept
+    def follow(self, subject: Subject[_F]) -> _F:
+        """What `subject` begins for this belief, from now on kept up to date by every observation.
+
+        A copy of the belief goes on with copies of its own. So whoever hands a planner copies asks the original for
+        what should know all looks, not only those of the copy (`roisearch.watch.LOOKED`).
+        """
+        for follower in self._followers:
+            if follower.subject is subject:
+                return cast(_F, follower)
+        begun = subject.begin(self._weights, self._shape)
+        lasting = [each for each in self._followers if each.lasts]
+        others = [each for each in self._followers if not each.lasts]
+        self._followers = [begun, *lasting, *others[: _KEPT - 1]]
+        return begun
 
     def copy(self) -> Belief:
         """An independent belief in the same state."""
         twin = Belief.__new__(Belief)
         twin._shape = self._shape
         twin._weights = self._weights.copy()
-        twin._first, twin._rescaled = self._first, self._rescaled
-        twin._tally = self._tally.copy()
         twin._outside = self._outside
         twin._offsets = self._offsets
         twin._sums = self._sums.copy()
-        twin._forests = [kept.copy() for kept in self._forests]
+        twin._followers = [each.copy() for each in self._followers]
+        twin._drift = None if self._drift is None else self._drift.copy()
         twin.hits = self.hits
+        twin._pack()
         return twin
 
-    def to_bytes(self) -> bytes:
-        """The whole state, bit for bit, for `from_bytes`; the same on every machine."""
-        head = struct.pack("<qqd", *self._shape, self._outside)
-        return _MAGIC + head + self._weights.astype("<f8", copy=False).tobytes()
-
-    @classmethod
-    def from_bytes(cls, data: bytes) -> Belief:
-        """The belief that `to_bytes` wrote.
-
-        Raises:
-            ValueError: when `data` is not such a belief, whole.
-        """
-        start = len(_MAGIC) + struct.calcsize("<qqd")
-        if len(data) < start or not data.startswith(_MAGIC):
-            raise ValueError("these bytes are not a belief of this version")
-        rows, cols, outside = struct.unpack_from("<qqd", data, len(_MAGIC))
-        if rows < 1 or cols < 1 or len(data) - start != rows * cols * 8:
-            raise ValueError("the bytes of the belief are cut short or damaged")
-        belief = cls.__new__(cls)
-        belief._shape = (rows, cols)
-        belief._take(np.frombuffer(data, dtype="<f8", offset=start).astype(np.float64), outside)
-        return belief
-
     def digest(self) -> str:
-        """A fingerprint of the state, bit for bit: equal digests, equal beliefs (SHA-256, hexadecimal)."""
-        return hashlib.sha256(self.to_bytes()).hexdigest()
+        """A fingerprint of the belief, SHA-256 in hexadecimal, the same on every machine.
+
+        It covers the shape of the map, the weight of each cell and the weight outside, to the last bit, and of a target
+        that walks what part of each weight does, and since when; nothing of what follows the belief, nor the number of
+        hits.
+        """
+        state = hashlib.sha256(b"roisearch-belief-1\n" + struct.pack("<qqd", *self._shape, self._outside))
+        state.update(self._weights.astype("<f8", copy=False).tobytes())
+        if self._drift is not None:
+            state.update(struct.pack("<q", self._drift.waiting_us))
+            state.update(self._drift.going.astype("<f8", copy=False).tobytes())
+        return state.hexdigest()
 
 
 _YES_NO = (np.zeros(1, dtype=np.bool_), np.ones(1, dtype=np.bool_))

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch.fov import HEADINGS, heading_index
+from roisearch.directions import direction_index
+from roisearch.fov import HEADINGS
 
 Cell = tuple[int, int]
 
@@ -19,13 +20,22 @@ decision costs must not grow with the distance."""
 
 @dataclass(frozen=True, slots=True)
 class SearchState:
-    """Where the drone is: its cell (row, col), and its heading, which is the direction of its last move."""
+    """Where the drone is and how it moves.
+
+    Attributes:
+        cell: (row, col).
+        heading: the direction of its last move, one of `roisearch.directions.DIRECTIONS`.
+        speed_mps: how fast it flies there; 0 when it stands.
+    """
 
     cell: Cell
     heading: str = "north"
+    speed_mps: float = 0.0
 
     def __post_init__(self) -> None:
-        heading_index(self.heading)
+        direction_index(self.heading)
+        if not 0.0 <= self.speed_mps < float("inf"):
+            raise ValueError(f"speed_mps must be at least 0 and finite, not {self.speed_mps}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +62,8 @@ class Decision(NamedTuple):
     """The cells to enter next, and why. A named tuple, as making one must cost next to nothing.
 
     Attributes:
-        path: cells in order, each a neighbour of the last, the first a neighbour of the drone; never empty. Of a
-            long way, the first AHEAD cells.
+        path: cells in order, each a neighbour of the last, the first a neighbour of the drone; never empty. Eight
+            neighbours where the planner's motion has them, else four. Of a long way, the first AHEAD cells.
         action: "north", "east", "south", "west", "region 3", "elsewhere" (outside all regions), or the
             pattern's name for a planner that follows one.
         value: what the planner expects of it, in its own measure; comparable within one planner only.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from roisearch.walk import Drift, Walk
+
 
 class DetectionRecord:
     """Keeps, for each cell, the probability that all looks so far would have missed a target there.
@@ -12,11 +14,28 @@ class DetectionRecord:
     POD of a cell is 1 - prod(1 - p_tp) over its looks; POS, the probability of success so far, is the sum of
     POA times POD over the map, with POA the prior (Koopman 1980; National SAR Manual). A look counts whatever
     it reported, since POS is about the target being found, not about false alarms.
+
+    Of a target that walks the POD of a cell is the chance that one which is there now would have been detected before,
+    wherever it was then: ground that was searched fills up again with what nobody has looked at, and its POD falls. POS
+    stays what it is, the chance of having been found by now, by forward filtering (Brown 1980; Stone 1975, chapter 8).
     """
 
-    def __init__(self, prior: NDArray[np.float64], outside: float = 0.0) -> None:
-        """`prior`: float [rows, cols], any positive scale; `outside`: probability mass not on the map."""
+    def __init__(
+        self,
+        prior: NDArray[np.float64],
+        outside: float = 0.0,
+        *,
+        walk: Walk | None = None,
+        searchable: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """`prior`: float [rows, cols], any positive scale; `outside`: probability mass not on the map; `walk`: how the
+        target moves as `drift` lets time pass, over `searchable` cells, bool [rows, cols]."""
         self._poa = prior * ((1.0 - outside) / prior.sum())
+        self._drifts: tuple[Drift, Drift] | None = None
+        if walk is not None:
+            self._poa = np.ascontiguousarray(self._poa if searchable is None else self._poa * searchable)
+            ways = walk.ways((prior.shape[0], prior.shape[1]), searchable)
+            self._drifts = Drift(ways), Drift(ways)
         self._missed = np.ones_like(self._poa)
         self._left = 1.0 - outside
         self.looks = 0
@@ -28,6 +47,20 @@ class DetectionRecord:
         self._missed[rows, cols] *= 1.0 - p_tp
         self._left -= float((before * p_tp).sum())
         self.looks += len(cells)
+
+    def drift(self, seconds: float) -> None:
+        """Let time pass, as `Belief.drift` does: those that were detected and those that were not walk alike."""
+        if self._drifts is None:
+            return
+        everyone, missed = self._drifts
+        ticks = everyone.wait(seconds)
+        missed.wait(seconds)
+        if ticks:
+            left = self.undetected().ravel()
+            everyone.ways.go(self._poa.ravel(), everyone.going, ticks)
+            missed.ways.go(left, missed.going, ticks)
+            there = self._poa > 0.0
+            self._missed[there] = np.minimum(left.reshape(self._poa.shape)[there] / self._poa[there], 1.0)
 
     def pod(self) -> NDArray[np.float64]:
         """Cumulative probability of detection of each cell, float [rows, cols]."""

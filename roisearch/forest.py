@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from roisearch.kernels import forest as kernels
 from roisearch.kernels.looks import FANOUT
+from roisearch.walk import Ways
 
 
 class Forest:
@@ -82,18 +83,20 @@ class Forest:
         for node in range(leaves, total):
             self.parent[self.first[node] : self.last[node]] = node
 
-    def sums(self, weights: NDArray[np.float64]) -> ForestSums:
-        """Sum and peak of every node for these weights [cells]."""
+    def begin(self, weights: NDArray[np.float64], shape: tuple[int, int]) -> ForestSums:
+        """Sum and peak of every node for these weights [cells]; see `Belief.follow`."""
         fresh = ForestSums(self, np.empty(self.first.size), np.empty(self.first.size))
-        fresh.grow(weights)
+        fresh.renew(weights, 1.0)
         return fresh
 
 
 class ForestSums:
     """Sum and peak of every node of a forest, for one belief, which keeps them up to date."""
 
+    lasts = False
+
     def __init__(self, forest: Forest, sums: NDArray[np.float64], peaks: NDArray[np.float64]) -> None:
-        self.forest = forest
+        self.subject = forest
         self.sums = sums
         self.peaks = peaks
         self._parcel = kernels.TOUCHED.pack(
@@ -107,18 +110,27 @@ class ForestSums:
             peaks=peaks,
         )
 
-    def grow(self, weights: NDArray[np.float64]) -> None:
+    @property
+    def address(self) -> int:
+        """Of what `roisearch.kernels.forest.TOUCHED` has packed."""
+        return self._parcel.address
+
+    def renew(self, weights: NDArray[np.float64], factor: float) -> None:
         """Recompute everything."""
-        f = self.forest
+        f = self.subject
         kernels.grow(weights, f.cell_of, f.first, f.last, self.sums, self.peaks)
 
-    def touch(self, cells: NDArray[np.int64], weights: NDArray[np.float64]) -> None:
+    def drifted(self, weights: NDArray[np.float64], ways: Ways, ticks: int) -> None:
+        """Recompute everything."""
+        self.renew(weights, 1.0)
+
+    def touch(self, cells: NDArray[np.int64], hits: NDArray[np.bool_], weights: NDArray[np.float64]) -> None:
         """Recompute what depends on `cells` [k, 2]."""
         kernels.touch(cells, weights, self._parcel.address)
 
     def copy(self) -> ForestSums:
         """An independent copy for a copied belief."""
-        return ForestSums(self.forest, self.sums.copy(), self.peaks.copy())
+        return ForestSums(self.subject, self.sums.copy(), self.peaks.copy())
 
 
 def _morton(rows: NDArray[np.int64], cols: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from roisearch.directions import direction_index
+
 HEADINGS = ("north", "east", "south", "west")
 MOVES = ((-1, 0), (0, 1), (1, 0), (0, -1))
 """Row and column step of each heading, in the order of HEADINGS."""
@@ -16,11 +18,11 @@ DEFAULT_P = 0.9
 
 
 def heading_index(heading: str) -> int:
-    """The place of `heading` in HEADINGS; ValueError when it is none of them."""
-    try:
-        return HEADINGS.index(heading)
-    except ValueError:
-        raise ValueError(f"a heading is one of {', '.join(HEADINGS)}, not '{heading}'") from None
+    """The place of `heading` in HEADINGS, of a diagonal direction that of the next one clockwise.
+
+    ValueError when it is none of `roisearch.directions.DIRECTIONS`.
+    """
+    return (direction_index(heading) + 1) // 2 % 4
 
 
 @dataclass(frozen=True, eq=False)

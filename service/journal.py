@@ -17,15 +17,20 @@ import os
 import queue
 import sqlite3
 import threading
+import time
 import zlib
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from service.errors import BadInput
+from service.mark import Mark, mark_path, read_mark
 
+BUSY_S, AGAIN_S = 1.0, 0.05
+LOCKED_S = 120.0  # of waiting for a program that has locked the file, before the journal counts as lost
 SCHEMA_VERSION = 2  # 1 had no checksums
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -48,8 +53,23 @@ class Row:
     body: dict[str, Any]
 
 
+class RowValue(Protocol):
+    """What a row says, as the classes of `service.rows` do: what kind of row, and its body."""
+
+    @property
+    def kind(self) -> str:
+        """Of the row."""
+
+    def body(self) -> Mapping[str, Any]:
+        """As JSON has it."""
+
+
 class Duplicate(ValueError):
     """The key of this event is in the journal already."""
+
+
+class JournalLost(RuntimeError):
+    """The journal cannot be written: nothing may be believed or acknowledged any more."""
 
 
 @dataclass(frozen=True)
@@ -73,25 +93,34 @@ class Journal:
         self.failed: Exception | None = None
         """The first write that did not succeed."""
         self._queue: queue.SimpleQueue[list[_Entry] | None] = queue.SimpleQueue()
+        self._waiting: deque[float] = deque()
         self._closed = False
         self._last = 0
         with contextlib.ExitStack() as undo:
             self._lock = _lock(path)
             undo.callback(os.close, self._lock)
             try:
-                self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+                self._database = sqlite3.connect(
+                    path, check_same_thread=False, isolation_level=None, timeout=BUSY_S
+                )
                 undo.callback(self._database.close)
                 self._database.execute("PRAGMA journal_mode=WAL")
                 self._database.execute("PRAGMA synchronous=FULL")
                 self._open()
-            except (sqlite3.Error, UnicodeDecodeError) as error:
+                self._mark = Mark(path)
+                self._file = _descriptor(path)
+            except (sqlite3.Error, UnicodeDecodeError, OSError) as error:
                 raise _cannot_open(path, error) from error
+            self._mark.move(self._last)
             undo.pop_all()
         self._writer = threading.Thread(target=self._write, name="journal", daemon=True)
         self._writer.start()
 
     def _open(self) -> None:
+        mark = read_mark(self.path)
         if not self._database.execute("SELECT 1 FROM sqlite_master WHERE name = 'meta'").fetchone():
+            if mark:  # all there was is in the file that is missing
+                raise _shorter(self.path, mark, 0)
             self._database.executescript(SCHEMA)
             self.set_meta("schema", SCHEMA_VERSION)
             return
@@ -106,6 +135,8 @@ class Journal:
                 raise _damaged(self.path, f"row {self._last} is missing")
             if row[-1] != _crc(*row[:-1]):
                 raise _damaged(self.path, f"row {row[0]} is not what was written")
+        if mark > self._last:
+            raise _shorter(self.path, mark, self._last)
 
     def _add_checksums(self) -> None:
         """From schema 1 to 2."""
@@ -126,9 +157,15 @@ class Journal:
         """Store a JSON value under a key (used before the run starts)."""
         self._database.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, json.dumps(value)))
 
-    def write(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> Future[int]:
-        """Queue a row; the future holds its number once it is on disk, or raises Duplicate."""
-        entry = _Entry(time, kind, key, json.dumps(dict(body)), Future())
+    def write(
+        self, time: float, said: RowValue | str, body: Mapping[str, Any] | None = None, key: str | None = None
+    ) -> Future[int]:
+        """Queue a row, by its value, or by its kind and its body.
+
+        The future holds its number once it is on disk, or raises Duplicate.
+        """
+        kind, told = (said, body or {}) if isinstance(said, str) else (said.kind, said.body())
+        entry = _Entry(time, kind, key, json.dumps(dict(told)), Future())
         self._enqueue([entry])
         return entry.done
 
@@ -138,11 +175,22 @@ class Journal:
             raise RuntimeError("the journal is closed")
         for entry in entries:
             entry.done.set_running_or_notify_cancel()  # who stops waiting does not stop the row from being written
+        self._waiting.append(time.monotonic())
         self._queue.put(entries)
 
-    async def append(self, time: float, kind: str, body: Mapping[str, Any], key: str | None = None) -> int:
-        """Write a row and return its number once it is on disk; raises Duplicate when `key` is known."""
-        return await asyncio.wrap_future(self.write(time, kind, body, key))
+    def behind_s(self) -> float:
+        """How long the oldest row has been waiting to be on disk, in seconds of wall time: a slow or locked disk."""
+        try:
+            return time.monotonic() - self._waiting[0]
+        except IndexError:
+            return 0.0
+
+    async def append(
+        self, time: float, said: RowValue | str, body: Mapping[str, Any] | None = None, key: str | None = None
+    ) -> int:
+        """Write a row as `write` does, and return its number once it is on disk; raises Duplicate when `key` is
+        known."""
+        return await asyncio.wrap_future(self.write(time, said, body, key))
 
     async def append_all(self, rows: Sequence[tuple[float, str, str, str]]) -> list[bool]:
         """Write rows of (time, kind, key, body as JSON) in one transaction; returns when they are on disk.
@@ -169,6 +217,7 @@ class Journal:
             self._queue.put(None)
             self._writer.join()
             self._database.close()
+            self._mark.close()
             os.close(self._lock)
 
     def _write(self) -> None:
@@ -179,31 +228,49 @@ class Journal:
             while not self._queue.empty():
                 batch.append(self._queue.get())
             open_ = None not in batch
-            self._commit([entry for entries in batch if entries is not None for entry in entries])
+            rows = [entry for entries in batch if entries is not None for entry in entries]
+            self._settle(self._commit(rows))
+            for _ in range(len(batch) - (not open_)):
+                self._waiting.popleft()
 
-    def _commit(self, entries: list[_Entry]) -> None:
+    def _commit(self, entries: list[_Entry]) -> list[tuple[_Entry, int | Exception]]:
+        """Write them in one transaction; a database that another program has locked is waited for."""
+        patience = time.monotonic() + LOCKED_S
+        while True:
+            try:
+                return self._insert(entries)
+            except sqlite3.Error as error:
+                with contextlib.suppress(sqlite3.Error):
+                    if self._database.in_transaction:
+                        self._database.execute("ROLLBACK")
+                if not _is_locked(error) or time.monotonic() > patience:
+                    self.failed = self.failed or error
+                    return [(entry, error) for entry in entries]
+                time.sleep(AGAIN_S)
+
+    def _insert(self, entries: list[_Entry]) -> list[tuple[_Entry, int | Exception]]:
+        if os.fstat(self._file).st_nlink == 0:  # SQLite writes on into what nobody can ever read
+            raise sqlite3.OperationalError("its file has been deleted")
         outcomes: list[tuple[_Entry, int | Exception]] = []
         last = self._last
-        try:
-            self._database.execute("BEGIN IMMEDIATE")
-            for entry in entries:
-                row = (last + 1, entry.time, entry.kind, entry.key, entry.body)
-                try:
-                    self._database.execute("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", (*row, _crc(*row)))
-                    last += 1
-                    outcomes.append((entry, last))
-                except sqlite3.IntegrityError:
-                    if not self._knows(entry.key):
-                        raise
-                    outcomes.append((entry, Duplicate(f"'{entry.key}' is in the journal already")))
-            self._database.execute("COMMIT")
-            self._last = last
-        except sqlite3.Error as error:
-            self.failed = self.failed or error
-            with contextlib.suppress(sqlite3.Error):
-                if self._database.in_transaction:
-                    self._database.execute("ROLLBACK")
-            outcomes = [(entry, error) for entry in entries]
+        self._database.execute("BEGIN IMMEDIATE")
+        for entry in entries:
+            row = (last + 1, entry.time, entry.kind, entry.key, entry.body)
+            try:
+                self._database.execute("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", (*row, _crc(*row)))
+                last += 1
+                outcomes.append((entry, last))
+            except sqlite3.IntegrityError:
+                if not self._knows(entry.key):
+                    raise
+                outcomes.append((entry, Duplicate(f"'{entry.key}' is in the journal already")))
+        self._database.execute("COMMIT")
+        self._last = last
+        self._mark.move(last)
+        return outcomes
+
+    @staticmethod
+    def _settle(outcomes: list[tuple[_Entry, int | Exception]]) -> None:
         for entry, outcome in outcomes:
             if isinstance(outcome, Exception):
                 entry.done.set_exception(outcome)
@@ -237,6 +304,16 @@ def _lock(path: Path) -> int:
     return lock
 
 
+def _descriptor(path: Path) -> int:
+    """By which number this process has the database open: a second one, once closed, would cost SQLite its locks."""
+    sought = path.stat()
+    for each in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(OSError):
+            if os.path.samestat(each.stat(), sought):
+                return int(each.name)
+    raise OSError(f"{path} is not the file that was opened")
+
+
 def _cannot_open(path: Path, error: Exception) -> BadInput:
     return BadInput(f"{path}: the journal cannot be opened ({error}); give a writable folder")
 
@@ -251,6 +328,19 @@ def _crc(seq: int, time: float, kind: str, key: str | None, body: str) -> int:
 
 def _damaged(path: Path, how: str) -> BadInput:
     return BadInput(f"{path}: the journal is damaged ({how}); resume from a copy, or begin a new run")
+
+
+def _is_locked(error: sqlite3.Error) -> bool:
+    """Whether another program only has to let go of the file."""
+    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+    return code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+
+
+def _shorter(path: Path, mark: int, last: int) -> BadInput:
+    return BadInput(
+        f"{path}: the journal has lost its end (row {mark} was written, row {last} is the last here); copy it together "
+        f"with its -wal file, or delete {mark_path(path).name} to do without those rows"
+    )
 
 
 def _refuse_newer(path: Path, schema: object) -> None:
@@ -271,6 +361,14 @@ def _meta(database: sqlite3.Connection, path: Path, key: str) -> Any:
 
 def read_meta(path: Path, key: str) -> Any:
     """A value that a journal was given with `set_meta`; raises BadInput when there is no such journal or value."""
+    value = read_meta_if_any(path, key)
+    if value is None:
+        raise BadInput(f"{path}: the journal has no {key}; it is not one of a started run")
+    return value
+
+
+def read_meta_if_any(path: Path, key: str) -> Any:
+    """The same, or None when it was not given that value; raises BadInput when there is no such journal."""
     database = _open_to_read(path)
     try:
         _refuse_newer(path, _meta(database, path, "schema"))
@@ -279,8 +377,6 @@ def read_meta(path: Path, key: str) -> Any:
         raise BadInput(f"{path}: the journal cannot be read ({error})") from error
     finally:
         database.close()
-    if value is None:
-        raise BadInput(f"{path}: the journal has no {key}; it is not one of a started run")
     return value
 
 
@@ -288,7 +384,7 @@ def _open_to_read(path: Path) -> sqlite3.Connection:
     """A reader beside the writer, if there is one: in WAL mode neither waits for the other."""
     if not path.is_file():
         raise BadInput(f"{path}: there is no journal here; give the folder of a run")
-    address = path.resolve().as_uri()
+    address, mark = path.resolve().as_uri(), read_mark(path)
     try:
         database = sqlite3.connect(f"{address}?mode=ro", uri=True)
     except sqlite3.Error as error:
@@ -296,12 +392,17 @@ def _open_to_read(path: Path) -> sqlite3.Connection:
     try:
         database.execute("SELECT count(*) FROM sqlite_master").fetchone()
     except sqlite3.OperationalError:  # a finished run where not even SQLite's own files may be written
-        if path.with_name(path.name + "-wal").exists():
-            return database
-        database.close()
-        database = sqlite3.connect(f"{address}?mode=ro&immutable=1", uri=True)
+        if not path.with_name(path.name + "-wal").exists():
+            database.close()
+            database = sqlite3.connect(f"{address}?mode=ro&immutable=1", uri=True)
     except (sqlite3.Error, UnicodeDecodeError):  # the latter when the damage is in what SQLite wants to say
         pass  # whoever reads is told
+    if mark:
+        with contextlib.suppress(sqlite3.Error, UnicodeDecodeError):  # whoever reads is told
+            last = database.execute("SELECT max(seq) FROM events").fetchone()[0] or 0
+            if last < mark:
+                database.close()
+                raise _shorter(path, mark, last)
     return database
 
 

@@ -6,12 +6,13 @@ import asyncio
 import logging
 import sys
 from collections.abc import Callable
-from typing import Any
 
 from rich.console import Console
 from rich.live import Live
 from rich.logging import RichHandler
 from rich.table import Table
+
+from service.view.state import RunState
 
 log = logging.getLogger("roisearch")
 LINE_EVERY_S = 5.0
@@ -30,7 +31,7 @@ def set_up_logging(console: Console) -> None:
     log.propagate = False
 
 
-def facts(state: dict[str, Any]) -> list[tuple[str, str]]:
+def facts(state: RunState) -> list[tuple[str, str]]:
     """The state in words: name and value."""
     battery = state["battery_percent"]
     left = state["flight_left_s"]
@@ -38,17 +39,20 @@ def facts(state: dict[str, Any]) -> list[tuple[str, str]]:
     return [
         ("state", state["state"]),
         ("probability of success so far", f"{state['pos']:.1%}"),
-        ("most likely place", f"{place['probability']:.1%} at {place['lat']:.6f}, {place['lon']:.6f}"),
+        ("most likely place", f"{place['probability']:.1%} at {place['written']}"),
         ("steps", str(state["steps"])),
         ("in the air", f"{state['flight_time_s']:.0f} s"),
         ("flight time left", "unknown" if left is None else f"about {left / 60:.0f} min"),
         ("battery", "unknown" if battery is None else f"{battery:.0f} %"),
         ("going to", state["reason"]),
+        *((f"aircraft {one['name']}", f"{one['state']}  {one['why']}") for one in state["aircraft"][1:]),
     ]
 
 
-def line(state: dict[str, Any]) -> str:
+def line(state: RunState) -> str:
     """The state as one log line."""
+    if len(state["aircraft"]) > 1:
+        return _line_of_several(state)
     battery = state["battery_percent"]
     return (
         f"{state['state']:10} POS {state['pos']:6.1%}  {state['steps']:4d} steps  "
@@ -56,20 +60,33 @@ def line(state: dict[str, Any]) -> str:
     )
 
 
-def _table(state: dict[str, Any]) -> Table:
+def _line_of_several(state: RunState) -> str:
+    """The state as one log line that tells of each aircraft."""
+    each = (f"{one['name']} {one['state']} {_percent(one['battery'])}" for one in state["aircraft"])
+    return f"POS {state['pos']:6.1%}  {'  '.join(each)}"
+
+
+def _percent(value: float | None) -> str:
+    return "?" if value is None else f"{value:.0f} %"
+
+
+def _table(state: RunState) -> Table:
     table = Table.grid(padding=(0, 2))
     for name, value in facts(state):
         table.add_row(f"[dim]{name}[/dim]", value)
     return table
 
 
-async def show(console: Console, state: Callable[[], dict[str, Any]]) -> None:
+async def show(console: Console, state: Callable[[], RunState]) -> None:
     """Show the state until cancelled."""
     if not console.is_terminal:
         while True:
             await asyncio.sleep(LINE_EVERY_S)
             log.info("%s", line(state()))
     with Live(_table(state()), console=console, refresh_per_second=8) as live:
-        while True:
-            await asyncio.sleep(0.125)
-            live.update(_table(state()))
+        try:
+            while True:
+                await asyncio.sleep(0.125)
+                live.update(_table(state()))
+        finally:
+            live.update(_table(state()))  # what stands there at the end is the end

@@ -2,21 +2,48 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from service.area import Grid, SearchArea
 from service.config import Settings, changed_settings
+from service.drawing import RegionsRow
+from service.entries import Entry, read_entries, understanding
 from service.errors import BadInput
 from service.evidence.intake import Intake
-from service.evidence.observe import Observation
-from service.evidence.verdict import ROW as VERDICT
-from service.journal import Row, read_last, read_meta, read_rows
+from service.evidence.moments import HISTORY_S
+from service.journal import read_meta, read_meta_if_any
+from service.known import Judgement, Withdrawn
+from service.mission.flight import Flight
+from service.mission.orders import ASKED, FINISHED
+from service.mission.standing import Standing
+from service.mission.states import FINAL, FLYING, MAY_MOVE, SETTLED, Event, State
+from service.rows import (
+    CommandRow,
+    DecisionRow,
+    FlightRow,
+    NewsRow,
+    ReplacedRow,
+    ReportRow,
+    ResumedRow,
+    SortieRow,
+    TransitionRow,
+    VehicleRow,
+    VerdictRow,
+    WithdrawnRow,
+)
 from service.search import Search
-from service.survey import AREA, JOURNAL, PRIOR, survey
+from service.story import FlightSoFar
+from service.survey import AREA, JOURNAL, PRIOR, is_of, read_survey, survey
+
+MOSTLY = 0.5
+NUMBER = "number"
+"""The key of a run's number in its journal."""
+_SAY_WHICH = frozenset({"link.connect", "link.system_id", "aircraft"})
+"""Settings that say which aircraft it is."""
 
 
 def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
@@ -24,7 +51,7 @@ def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
     return changed_settings(read_meta(journal, "settings"), changed, str(journal))
 
 
-def stored_run(folder: Path) -> tuple[Settings, SearchArea, Grid, list[Row]]:
+def stored_run(folder: Path) -> tuple[Settings, SearchArea, Grid, list[Entry]]:
     """What a run's folder holds, under way or over: settings, area, grid, and the journal as it is now.
 
     Raises BadInput when it holds no run that has begun, or its journal is of another grid.
@@ -35,37 +62,84 @@ def stored_run(folder: Path) -> tuple[Settings, SearchArea, Grid, list[Row]]:
     area, grid = survey(folder / AREA, prior if prior.exists() else None, settings)
     if read_meta(journal, "grid") != grid.frame.to_dict():
         raise BadInput(f"{folder}: its journal is of another grid than its area file makes")
-    rows = list(read_rows(journal))
+    rows = list(read_entries(journal))
     if not rows:
         raise BadInput(f"{folder}: its journal is empty; nothing has happened yet that could be shown")
     return settings, area, grid, rows
 
 
-def last_transition(journal: Path) -> dict[str, str] | None:
-    """The last change of state in a journal (`from`, `event`, `to`, `reason`), or None before the first."""
-    rows = read_last(journal, "transition", 1)
-    return rows[0].body if rows else None
-
-
-def retrace(row: Row, search: Search) -> None:
+def retrace(entry: Entry, search: Search) -> None:
     """Apply what a journal row says about the ground, if anything, to a search; rows come in their order."""
-    if row.kind == VERDICT:
-        down, across = row.body["cell"]
-        said = Observation.from_dict(row.body["observation"])
-        search.judge((down, across), said, confirmed=row.body["confirmed"])
-    elif row.kind == "report" and row.body["observation"] is not None:
-        search.apply(Observation.from_dict(row.body["observation"]))
+    said = entry.said
+    if isinstance(said, VerdictRow):
+        search.take(Judgement(said.cell, said.observation, said.confirmed), entry.time)
+    elif isinstance(said, ReportRow) and said.observation is not None:
+        search.take(said.observation, said.captured)
+    elif isinstance(said, NewsRow):
+        search.take(said.news, entry.time)
+    elif isinstance(said, WithdrawnRow):
+        search.take(Withdrawn(said.id), entry.time)
+    elif isinstance(said, RegionsRow):
+        search.take_drawing(said.drawing)
 
 
-@contextlib.contextmanager
-def _knowing(journal: Path, row: Row) -> Iterator[None]:
-    """Say which row it was that could not be understood."""
-    try:
-        yield
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise BadInput(
-            f"{journal}: row {row.seq} is no {row.kind} that this version knows ({error})"
-        ) from error
+@dataclass(frozen=True)
+class Remembered:
+    """What an intake has to know of an earlier run of the same search: the ids that count as known, in their order, and
+    the last rows of reports, to whose passes the next ones may belong."""
+
+    journal: Path
+    ids: tuple[str, ...]
+    recent: tuple[Entry, ...]
+
+    def tell(self, intake: Intake) -> None:
+        """Make it known to an intake that has taken nothing in yet."""
+        for entry in self.recent:
+            with understanding(self.journal, entry.seq, ReportRow.kind):
+                assert isinstance(entry.said, ReportRow)
+                intake.recall(entry.said)
+        intake.remember(self.ids)
+        intake.accepted = len(self.ids)
+
+
+@dataclass(frozen=True)
+class Whose:
+    """Whose rows are meant: those of `aircraft`, and where it is the `first`, those of a time when it was the only one.
+
+    With the default, those of the only one, which are all that name none.
+    """
+
+    aircraft: str = ""
+    first: bool = True
+
+    def __contains__(self, entry: Entry) -> bool:
+        return entry.aircraft == self.aircraft or (self.first and not entry.aircraft)
+
+
+ALONE = Whose()
+
+
+def retrace_all(
+    journal: Path, search: Search, told: Callable[[float, float], None] = lambda time, pos: None
+) -> dict[str, Remembered]:
+    """Apply the journalled observations, verdicts and news to a fresh search, in their order; what the intake of each
+    aircraft has to know.
+
+    `told` hears the time of each row and the POS after it.
+    """
+    ids: dict[str, dict[str, None]] = {}
+    recent: dict[str, deque[Entry]] = {}
+    for entry in read_entries(journal, ReportRow, VerdictRow, NewsRow, WithdrawnRow, RegionsRow):
+        with understanding(journal, entry.seq, entry.said.kind):
+            retrace(entry, search)
+        if isinstance(entry.said, ReportRow):
+            ids.setdefault(entry.aircraft, {})[entry.said.id] = None
+            lately = recent.setdefault(entry.aircraft, deque())
+            lately.append(entry)
+            while lately[0].time < entry.time - HISTORY_S:
+                lately.popleft()
+        told(entry.time, search.record.pos)
+    return {name: Remembered(journal, tuple(ids[name]), tuple(recent[name])) for name in ids}
 
 
 def replay(
@@ -74,25 +148,171 @@ def replay(
     intake: Intake,
     told: Callable[[float, float], None] = lambda time, pos: None,
 ) -> int:
-    """Apply the journalled observations and verdicts to a fresh search, in their order, and take up the passes that
-    were going on: what hovers over a cell has looked at it once, whether or not the service was killed meanwhile.
+    """Retrace a journal, and take up the passes that were going on: what hovers over a cell has looked at it once,
+    whether or not the service was killed meanwhile. Returns how many reports there were."""
+    remembered = remembered_of(retrace_all(journal, search, told), journal)
+    remembered.tell(intake)
+    return len(remembered.ids)
 
-    `told` hears the time of each row and the POS after it. Returns how many reports there were.
+
+def remembered_of(all_: dict[str, Remembered], journal: Path, whose: Whose = ALONE) -> Remembered:
+    """What the intake of one aircraft has to know of them."""
+    names = {whose.aircraft, ""} if whose.first else {whose.aircraft}
+    own = [all_[name] for name in sorted(names & set(all_))]
+    recent = sorted((entry for each in own for entry in each.recent), key=lambda entry: entry.seq)
+    return Remembered(journal, tuple(name for each in own for name in each.ids), tuple(recent))
+
+
+def why_over(journal: Path) -> str:
+    """Why a run is over, as a sentence's end: its target was found, there was nothing more to gain, or an operator
+    ended it. Nothing when it was broken off, or is under way. Of several aircraft all have to have ended."""
+    ended: dict[str, str] = {}
+    states: dict[str, State] = {}
+    for entry, row in _transitions(journal):
+        states[entry.aircraft] = row.after
+        why = ended.get(entry.aircraft, "")
+        ended[entry.aircraft] = "" if row.after in FLYING else _end_of(row) or why
+    if any(state not in FINAL for state in states.values()):
+        return ""
+    finished = [why for why in ended.values() if why and why != ABORTED]
+    every = bool(ended) and all(ended.values())
+    return finished[0] if finished else ABORTED if every else ""
+
+
+ABORTED = "an operator aborted it"
+
+
+def _end_of(row: TransitionRow) -> str:
+    """Why a search is over with a transition, or nothing."""
+    if row.event in (Event.CONFIRMED, Event.SEARCHED):
+        return row.reason
+    if row.event == Event.ABORT and row.reason == ASKED:
+        return ABORTED
+    return FINISHED if row.event == Event.FINISH else ""
+
+
+def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standing:
+    """How the mission of a journal stood when it was left, with the search retraced.
+
+    A restart that came no further than to hear the vehicle has changed nothing, nor has a fault that ended a process.
     """
-    ids = set()
-    recent: deque[Row] = deque()
-    for row in read_rows(journal, "report", VERDICT):
-        with _knowing(journal, row):
-            retrace(row, search)
-            if row.kind == "report":
-                ids.add(row.body["report"]["id"])
-                recent.append(row)
-                while recent[0].time < row.time - intake.history_s:
-                    recent.popleft()
-        told(row.time, search.record.pos)
-    for row in recent:
-        with _knowing(journal, row):
-            intake.recall(row)
-    intake.remember(ids)
-    intake.accepted = len(ids)
-    return len(ids)
+    standing = Standing()
+    for row in (row for entry, row in _transitions(journal) if entry in whose):
+        if row.after in (State.READY, State.ABORTED):
+            continue
+        settled = standing.settled or row.event in SETTLED
+        if row.after == row.before:  # nothing but that it is settled
+            standing = replace(standing, settled=settled, searched=True, why_stopped=row.reason)
+            continue
+        if row.after in FLYING:
+            standing, settled = Standing(state=row.after, why=row.reason), False
+        elif row.after == State.RETURNING and standing.state != State.FOUND:
+            searched = standing.searched or row.event in (Event.SEARCHED, Event.ENERGY_LOW)
+            stopped = standing.why_stopped or row.reason
+            standing = Standing(state=row.after, why=row.reason, why_stopped=stopped, searched=searched)
+        else:
+            standing = replace(standing, state=row.after, why=row.reason)
+        standing = replace(standing, settled=settled)
+    if standing.state == State.DONE:  # down before the search was over: whatever comes next is another flight
+        return Standing()
+    found = search.found()
+    going = standing.state in (State.RETURNING, State.FOUND)
+    return replace(standing, found=found, why_stopped="" if found and going else standing.why_stopped)
+
+
+def left_flight(journal: Path, search: Search, whose: Whose = ALONE) -> Flight:
+    """What was flown in the run of a journal.
+
+    What can be counted is counted as its story does. The seconds and the track are what was last written of them: a
+    story reckons on to its last row, and a flight that goes on adds what has passed since by itself.
+    """
+    flight, so_far = Flight(), FlightSoFar()
+    vehicle: tuple[int, str] | None = None
+    for entry in read_entries(
+        journal, FlightRow, SortieRow, DecisionRow, CommandRow, ReportRow, TransitionRow, VehicleRow
+    ):
+        if entry not in whose:
+            continue
+        so_far.take(entry, search.grid.frame)
+        match entry.said:
+            case SortieRow() as sortie:
+                flight.recall_sortie(sortie)
+            case FlightRow() as row:
+                flight.recall(row, entry.time)
+                flight.by = vehicle
+            case TransitionRow(after=state):
+                flight.flown |= state in MAY_MOVE
+            case VehicleRow(system_id=system_id, autopilot=autopilot):
+                vehicle = system_id, autopilot
+    flight.decisions, flight.waypoints, flight.hits = so_far.decisions, so_far.waypoints, so_far.hits
+    flight.told_s, flight.told_at = so_far.flown_s, so_far.last_time or 0.0
+    return flight
+
+
+def left_system_id(journal: Path, whose: Whose, asked: int | None) -> int | None:
+    """The MAVLink system id of the aircraft that a journal's run goes on with; None: of the next one heard.
+
+    As an operator has ordered, where one was replaced by another; as the settings have it (`asked`) otherwise, and
+    where they say since then over which link it is, or which one.
+    """
+    wanted = asked
+    for entry in read_entries(journal, ReplacedRow, ResumedRow):
+        if isinstance(entry.said, ReplacedRow) and entry in whose:
+            wanted = entry.said.system_id
+        elif isinstance(entry.said, ResumedRow) and not _SAY_WHICH.isdisjoint(entry.said.changed):
+            wanted = asked
+    return wanted
+
+
+def interrupted_run(parent: Path, area_file: Path, settings: Settings) -> tuple[Path | None, str]:
+    """The folder of the last run over an area, if it is not over, and what a person must know of that, or nothing.
+
+    It is of that area if it was begun with just this file, or if most of its ground is in this one, or this one cannot
+    be read any more: a file that is changed, or lost, while an aircraft flies must not cost the search what it knows.
+
+    Raises BadInput when its journal cannot be read, or there is no such run and no such file.
+    """
+    begun = runs_in_order(parent)
+    if not begun or why_over(begun[-1][0] / JOURNAL):
+        return None, ""
+    folder = begun[-1][0]
+    if area_file.is_file() and is_of(folder, area_file):
+        return folder, ""
+    goes_on = f"it goes on over the area as it was, which is {folder / AREA}"
+    kept, _ = read_survey(folder / AREA, settings)
+    try:
+        given, _ = read_survey(area_file, settings)
+    except BadInput as error:
+        return folder, f"{error}; {goes_on}"
+    common = kept.polygon.intersection(given.polygon).area
+    if common > MOSTLY * kept.polygon.area:
+        return folder, f"{area_file} is not what it was begun with; {goes_on}"
+    return None, f"{folder} was interrupted too, over other ground: --resume goes on with it"
+
+
+def runs_in_order(parent: Path) -> list[tuple[Path, int]]:
+    """The folders of the runs that were begun, in the order in which they were last gone on with, with their numbers.
+
+    A number counts what was begun or gone on with under `parent`: a computer that does not know the date gives its
+    runs names that say nothing. Where there is none, of an earlier version or in a journal that cannot be read, the
+    name says which runs were before it. Nobody can go on with a run that ended before it had its settings.
+    """
+    found: list[tuple[Path, int]] = []
+    so_far = 0
+    for journal in sorted(parent.glob(f"*/{JOURNAL}"), key=lambda path: path.parent.name):
+        number = so_far
+        try:
+            if read_meta_if_any(journal, "settings") is None:
+                continue
+            number = int(read_meta_if_any(journal, NUMBER) or so_far)
+        except BadInput:
+            pass  # whoever wants to go on with it is told
+        so_far = max(so_far, number)
+        found.append((journal.parent, number))
+    return sorted(found, key=lambda each: each[1])  # equal ones keep the order of their names
+
+
+def _transitions(journal: Path) -> Iterator[tuple[Entry, TransitionRow]]:
+    for entry in read_entries(journal, TransitionRow):
+        if isinstance(entry.said, TransitionRow):
+            yield entry, entry.said

@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import math
 import os
 import re
 import shutil
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -19,85 +19,179 @@ from typing import Any
 from rich.console import Console
 
 from service.area import Grid, SearchArea
-from service.clock import Clock
-from service.config import Settings
-from service.demo import World
+from service.assembly import Onboard, assemble_all
+from service.border.keeper import NOBODY, serving
+from service.config import Settings, about, each_aircraft
+from service.demo import DemoWorld
 from service.doors import Doors, open_doors
 from service.errors import BadInput
-from service.evidence.intake import Intake, JournalLost
-from service.evidence.observe import Observation, Pose
-from service.evidence.passes import Passes
-from service.evidence.sensors import Profile, make_sensor
+from service.evidence.cover import sensors_over
+from service.evidence.reports import OrderReceipt
+from service.evidence.sensors import Profile
+from service.ground.words import of_the_ground
 from service.http import Door, open_door
 from service.journal import Journal
-from service.mavlink import LinkError, LinkSettings, Vehicle, read_signing_key
-from service.mission.mission import Mission
+from service.lockstep import Lockstep
+from service.mavlink import LinkError, MavlinkSettings, Vehicle, check_link, read_signing_key
 from service.mission.states import FINAL, State
 from service.progress import set_up_logging, show
-from service.report import run_report, simulated, write_results
-from service.resume import last_transition, replay, stored_settings
-from service.search import Search
-from service.survey import AREA, JOURNAL, PRIOR, survey
+from service.provenance import note_beginning, note_resumption
+from service.report import REPORT, found_after_s, run_report, simulated, write_results
+from service.resume import Whose, interrupted_run, left_system_id, stored_settings, why_over
+from service.search import Search, begin
+from service.squad import Squad
+from service.survey import AREA, JOURNAL, PRIOR, keep_area, survey
+from service.telling import Plan, read_plan
+from service.timebase import clock_for
 from service.view.live import RunView
 
 log = logging.getLogger("roisearch")
-EXIT_CODES = {"found": 0, "not_found": 3, "aborted": 4}
+TOLD_POS = (0.5, 0.75, 0.9)
+"""The report tells how long it took to these."""
+EXIT_CODES = {"found": 0, "probable": 3, "not_found": 3, "aborted": 4}
 
 
-def run(area_file: Path, prior_file: Path | None, settings: Settings) -> int:
+@dataclass(frozen=True)
+class Prepared:
+    """All that has to be right before anything starts: the ground, the sensor, the addresses, the key.
+
+    `restarted`: it may be that no person started this, so that only an order takes off.
+    """
+
+    area: SearchArea
+    grid: Grid
+    sensors: Mapping[str, Profile]
+    settings: Settings
+    restarted: bool
+    door: Door
+    doors: Doors
+    signing_key: bytes | None
+    console: Console
+    telling: Plan = NOBODY
+
+
+def run(area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool = False) -> int:
     """Run a search from its area file to the ground; returns the exit code. Raises BadInput before it starts."""
-    console = Console()
-    set_up_logging(console)
-    area, grid = survey(area_file, prior_file, settings)
-    _tell(area, grid)
-    sensor = make_sensor(settings, grid)
-    signing_key = _signing_key(settings)
-    with _open(settings) as (door, doors):
-        folder = _new_folder(Path(settings.run.folder), area.name)
-        shutil.copyfile(area_file, folder / AREA)
+    with _prepared(area_file, prior_file, settings, restarted=restarted) as prepared:
+        folder = _new_folder(Path(settings.run.folder), prepared.area.name)
+        keep_area(area_file, folder, settings)
         if prior_file is not None:
             shutil.copyfile(prior_file, folder / PRIOR)
-        journal = Journal(folder / JOURNAL)
-        journal.set_meta("grid", grid.frame.to_dict())
-        journal.set_meta("settings", settings.model_dump())
-        return _search(area, grid, sensor, settings, folder, journal, door, doors, signing_key, console)
+        with contextlib.closing(Journal(folder / JOURNAL)) as journal:
+            journal.set_meta("grid", prepared.grid.frame.to_dict())
+            journal.set_meta("settings", settings.model_dump())
+            note_beginning(journal, folder, settings)
+            return _fly(prepared, folder, journal)
 
 
-def resume(folder: Path, changed: dict[str, Any]) -> int:
-    """Go on with the search of a run's folder, with its settings but for those `changed` ('section.key')."""
-    console = Console()
-    set_up_logging(console)
+def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) -> int:
+    """Go on with the search of a run's folder, with its settings but for those `changed` ('section.key').
+
+    Raises BadInput before it starts, also when that run is over.
+    """
     settings = stored_settings(folder / JOURNAL, changed)
+    if why := why_over(folder / JOURNAL):
+        raise BadInput(
+            f"{folder}: this run is over ({why}) and is not gone on with; begin a new one with --area"
+        )
     prior_file = folder / PRIOR
-    area, grid = survey(folder / AREA, prior_file if prior_file.exists() else None, settings)
-    _tell(area, grid)
-    sensor = make_sensor(settings, grid)
-    signing_key = _signing_key(settings)
-    with _open(settings) as (door, doors):
-        journal = Journal(folder / JOURNAL)
-        if journal.meta("grid") != grid.frame.to_dict():
+    prior = prior_file if prior_file.exists() else None
+    with (
+        _prepared(folder / AREA, prior, settings, restarted=restarted) as prepared,
+        contextlib.closing(Journal(folder / JOURNAL)) as journal,
+    ):
+        if journal.meta("grid") != prepared.grid.frame.to_dict():
             raise BadInput(
                 f"{folder}: its journal is of another grid than its area file makes; resume it unchanged"
             )
-        return _search(area, grid, sensor, settings, folder, journal, door, doors, signing_key, console)
+        note_resumption(journal, folder, settings)
+        return _fly(prepared, folder, journal)
 
 
 @contextlib.contextmanager
-def _open(settings: Settings) -> Iterator[tuple[Door, Doors]]:
-    """Take every address before anything starts, and give them up at the end; raises BadInput."""
+def _prepared(
+    area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool
+) -> Iterator[Prepared]:
+    """Read everything and take every address before anything starts, and give these up at the end; raises BadInput."""
+    console = Console()
+    set_up_logging(console)
+    area, grid = survey(area_file, prior_file, settings)
+    _tell(area, grid, settings)
+    if not settings.mock:
+        links: dict[str, str] = {}
+        for name, alone in each_aircraft(settings).items():
+            with about(name):
+                link = str(check_link(alone.link.connect))
+            if links.setdefault(link, name) != name:
+                raise BadInput(
+                    f"aircraft '{links[link]}' and '{name}' both have the link {link}; each needs its own"
+                )
+            _check_ground(alone)
+    sensors, signing_key = sensors_over(grid, settings), _signing_key(settings)
+    telling = read_plan(settings.telling)
     with (
         contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door,
         contextlib.closing(open_doors(settings.doors)) as doors,
     ):
-        yield door, doors
+        yield Prepared(area, grid, sensors, settings, restarted, door, doors, signing_key, console, telling)
 
 
-def _tell(area: SearchArea, grid: Grid) -> None:
+def _fly(prepared: Prepared, folder: Path, journal: Journal) -> int:
+    """Compile the planner and fly."""
+    searches = searches_of(prepared)
+    search = searches[0]
+    log.info("regions of interest: %d", search.regions.count)
+    log.info("%s plans %s", search.settings.search.planner, search.currency())
+    _compile(prepared.console, search)
+    for each in searches[1:]:
+        each.plan_anew()
+    service = Service(prepared, searches, folder)
+    return asyncio.run(service.fly(journal))
+
+
+def searches_of(prepared: Prepared) -> list[Search]:
+    """The search as each of the aircraft has it, with one belief."""
+    first, *others = each_aircraft(prepared.settings).items()
+    with about(first[0]):
+        common = begin(prepared.grid, prepared.settings)
+        search = Search(prepared.grid, first[1], aircraft=first[0], common=common)
+    return [search, *(_beside(search, name, settings) for name, settings in others)]
+
+
+def _beside(search: Search, name: str, settings: Settings) -> Search:
+    with about(name):
+        return search.beside(name, settings)
+
+
+def interrupted(area_file: Path, settings: Settings) -> Path | None:
+    """The folder of the run over an area that was begun last and is not over, if there is one; says so."""
+    folder, said = interrupted_run(Path(settings.run.folder), area_file, settings)
+    if folder is not None:
+        print(f"{folder} was interrupted: going on with it", flush=True)
+    if said:
+        print(said, flush=True)
+    return folder
+
+
+def _check_ground(settings: Settings) -> None:
+    """A real aircraft should fly over ground that somebody has thought about."""
+    if settings.real and not settings.ground_files and not settings.ground.flat:
+        log.warning(
+            "%s may be a real aircraft, and nothing says how high the ground is: give --ground FILE, or --flat to say "
+            "that a constant height above the launch point clears everything",
+            settings.link.connect,
+        )
+
+
+def _tell(area: SearchArea, grid: Grid, settings: Settings) -> None:
     """What a person should know about the area and its grid."""
     rows, cols = grid.frame.shape
     log.info("area: %s, %d cells of %g m to search", area.name, grid.searchable.sum(), grid.frame.cell_m)
     log.info("grid: %d x %d, turned to %.0f° true", rows, cols, grid.frame.bearing_deg)
-    for note in grid.notes:
+    log.info("ground: %s", of_the_ground(grid, settings))
+    if settings.sensor.terrain_file:
+        log.warning("sensor.terrain_file is the old name of ground.file, and sets the heights of flight too")
+    for note in (*area.notes, *grid.notes):
         log.info("note: %s", note)
 
 
@@ -110,30 +204,6 @@ def _signing_key(settings: Settings) -> bytes | None:
             "the built-in mock autopilot does not sign; give --connect, or leave link.signing_key_file out"
         )
     return read_signing_key(settings.link.signing_key_file)
-
-
-def _search(
-    area: SearchArea,
-    grid: Grid,
-    sensor: Profile,
-    settings: Settings,
-    folder: Path,
-    journal: Journal,
-    door: Door,
-    doors: Doors,
-    signing_key: bytes | None,
-    console: Console,
-) -> int:
-    """Compile the planner and fly."""
-    try:
-        search = Search(grid, settings)
-        log.info("regions of interest: %d", search.regions.count)
-        _compile(console, search)
-        service = Service(area, search, sensor, settings, folder, console)
-        service.view.estimator.warm_up()
-        return asyncio.run(service.fly(door, doors, journal, signing_key))
-    finally:
-        journal.close()
 
 
 def _new_folder(parent: Path, name: str) -> Path:
@@ -162,172 +232,152 @@ def _compile(console: Console, search: Search) -> None:
     log.info("planner %s compiled in %.1f s", search.settings.search.planner, time.perf_counter() - began)
 
 
+def _lockstep(settings: Settings) -> Lockstep | None:
+    """The time of the simulator that waits for us: the built-in one, or one that the settings name. Raises BadInput.
+
+    In real time the built-in one waits for nobody: detectors of other people tell the wall's time.
+    """
+    if settings.link.lockstep:
+        return Lockstep(Path(settings.link.lockstep), settings.speedup)
+    return Lockstep.create(settings.speedup) if settings.mock and settings.speedup > 1.0 else None
+
+
 class Service:
     """A search from its first process to the last file it leaves."""
 
-    def __init__(
-        self,
-        area: SearchArea,
-        search: Search,
-        sensor: Profile,
-        settings: Settings,
-        folder: Path,
-        console: Console,
-    ) -> None:
-        self.area, self.search, self.settings = area, search, settings
-        self.folder, self.console = folder, console
-        self.clock = Clock(settings.speedup)
-        self.world: World | None = None
-        self.sensor = sensor
-        self.view = RunView(area, search, self.sensor, settings, self.clock)
+    def __init__(self, prepared: Prepared, searches: Sequence[Search], folder: Path) -> None:
+        self.prepared, self.searches, self.folder = prepared, searches, folder
+        self.search = searches[0]
+        self.area, self.settings = prepared.area, prepared.settings
+        self.lockstep = _lockstep(prepared.settings)
+        pace = self.lockstep.ticks if self.lockstep else None
+        self.clock = clock_for(folder / JOURNAL, prepared.settings.speedup, pace)
+        self.world: DemoWorld | None = None
+        self.view = RunView(prepared.area, self.search, prepared.sensors, prepared.settings, self.clock)
 
-    async def fly(self, door: Door, doors: Doors, journal: Journal, signing_key: bytes | None) -> int:
+    async def fly(self, journal: Journal) -> int:
         """Start everything, fly, and write the results; returns the exit code."""
+        door, doors = self.prepared.door, self.prepared.doors
         began = time.time()
         door, guest_token = door.with_guest()
-        server = door.server(self.view)
-        serving = asyncio.create_task(server.run_until_told())
-        listening = asyncio.create_task(doors.serve(self.view.submit_all))
-        try:
-            while not server.started:  # a door that cannot be opened is said now, not after the flight
-                if serving.done():
-                    serving.result()
-                    raise RuntimeError("the door has closed before it was open")
-                await asyncio.sleep(0.01)
-            connect = await self._start_world()
-            link = self._link_settings(signing_key)
-            async with Vehicle.open(connect, clock=self.clock, settings=link) as vehicle:
-                mission = self._assemble(vehicle, journal)
-                log.info("listening on %s", door.url)
-                if self.world is not None:
-                    await self.world.start_detector(door.url, guest_token)
-                await self._run_mission(mission)
+        try:  # a door that cannot be opened is said now, not after the flight
+            telling = self.prepared.telling
+            async with serving(door, doors, self.view, self.view.ground, journal.path, telling):
+                connects = await self._start_world()
+                async with contextlib.AsyncExitStack() as links:
+                    vehicles = [
+                        await links.enter_async_context(self._open(search, connect))
+                        for search, connect in zip(self.searches, connects, strict=True)
+                    ]
+                    onboard = Onboard(self.prepared.sensors, self.prepared.restarted)
+                    squad = assemble_all(self.searches, vehicles, onboard, journal, self.view)
+                    self.view.begin(squad)
+                    log.info("listening on %s", door.address)
+                    if self.world is not None:
+                        await self.world.start_detectors(door.url, list(squad.missions), guest_token)
+                    await self._run_squad(squad)
+                await asyncio.sleep(0.3 if self.world is not None else 0.0)  # let the detector read the end
         except LinkError as error:
             log.error("%s", error)
         finally:
-            await asyncio.sleep(0.3 if self.world is not None else 0.0)  # let the detector read the end
-            server.should_exit = True
-            listening.cancel()
-            await asyncio.wait([listening])
-            await serving
             if self.world is not None:
                 await self.world.stop()
-        if self.view.mission is None:
+        if self.view.squad is None:
             return EXIT_CODES["aborted"]
-        report = run_report(self.view.mission, self.area.name, self.settings, began)
+        return self._leave_results(self.view.squad, began)
+
+    def _leave_results(self, squad: Squad, began: float) -> int:
+        """Write what the run leaves behind; returns the exit code."""
+        report = run_report(squad, self.area.name, self.settings, began)
+        report["pos_after_s"] = {f"{pos:g}": self.view.curve.when(pos) for pos in TOLD_POS}
         if self.world is not None:
-            report["simulated"] = simulated(self.world.target, self.view.mission, self.settings)
+            target = self.world.target_at(found_after_s(squad.leading))
+            report["simulated"] = simulated(target, squad, self.settings)
+        flown = any(each.flight.began for each in squad.missions.values())
+        if not flown and (self.folder / REPORT).exists():
+            log.info("nothing was flown: %s is left as it was", self.folder / REPORT)
+            return EXIT_CODES[report["outcome"]]
         try:
-            write_results(self.folder, self.view.mission, report, self.view.picture()())
+            write_results(self.folder, squad, report, self.view.picture()())
         except OSError as error:
             log.error("%s: the results cannot be written (%s)", self.folder, error.strerror)
         return EXIT_CODES[report["outcome"]]
 
-    def _assemble(self, vehicle: Vehicle, journal: Journal) -> Mission:
-        """Intake and mission around a vehicle, with what an earlier run of this search has journalled."""
+    def _open(self, search: Search, connect: str) -> contextlib.AbstractAsyncContextManager[Vehicle]:
+        """The link to one aircraft."""
+        return Vehicle.open(connect, clock=self.clock, settings=self._link_settings(search))
 
-        def pose_at(moment: float) -> Pose | None:
-            pose = vehicle.pose_at(moment)
-            if pose is None or not mission.helm.trust.trusted_at(moment):
-                return None
-            attitude = (pose.pitch_deg, pose.roll_deg)
-            return Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, moment, *attitude)
-
-        def observed(observation: Observation, arrived: float) -> None:
-            self.view.curve.add(self.clock.now(), self.search.record.pos)
-            mission.observed(observation, arrived)
-
-        intake = Intake(
-            self.search, self.sensor, journal, self.clock, pose_at, observed, vehicle.time_of_boot
-        )
-        intake.believed = self.view.believed.observe
-        intake.passes = Passes(again_s=self.settings.sensor.hover_look_s or math.inf)
-        mission = Mission(
-            settings=self.settings,
-            clock=self.clock,
-            search=self.search,
-            vehicle=vehicle,
-            journal=journal,
-            intake=intake,
-            may_take_off=self.settings.mock or self.settings.flight.takeoff,
-            sent=self.view.latency.observe,
-            thought=self.view.thinking.observe,
-        )
-        replayed = replay(journal.path, self.search, intake, self.view.curve.add)
-        if replayed:
-            log.info(
-                "resumed: %d reports of the earlier run, POS %.1f %%", replayed, 100 * self.search.record.pos
-            )
-        if (last := last_transition(journal.path)) is not None and last["to"] == State.RETURNING:
-            mission.departure.was_returning = last
-        self.view.mission, self.view.intake = mission, intake
-        return mission
-
-    def _link_settings(self, signing_key: bytes | None) -> LinkSettings:
-        link = self.settings.link
-        return LinkSettings(
-            system_id=link.system_id or None,
+    def _link_settings(self, search: Search) -> MavlinkSettings:
+        link, name = search.settings.link, f"-{search.aircraft}" if search.aircraft else ""
+        whose = Whose(search.aircraft, search is self.search)
+        return MavlinkSettings(
+            system_id=left_system_id(self.folder / JOURNAL, whose, link.system_id or None),
             allow_arming=self.settings.mock or self.settings.flight.takeoff,
             link_lost_s=link.silent_after_s,
-            signing_key=signing_key,
-            signing_timestamp_file=Path(self.settings.run.folder) / "signing-timestamp",
+            arming_patience_s=link.connect_timeout_s,
+            read_return_height=self.search.grid.relief is not None,
+            read_motion=True,
+            signing_key=self.prepared.signing_key,
+            signing_timestamp_file=Path(self.settings.run.folder) / f"signing-timestamp{name}",
         )
 
-    async def _start_world(self) -> str:
+    async def _start_world(self) -> list[str]:
+        """The links to the aircraft; without any given, to those of the built-in world, which is begun."""
+        alone = each_aircraft(self.settings)
         if not self.settings.mock:
-            log.info("link: %s", self.settings.link.connect)
-            return self.settings.link.connect
-        demo = self.settings.demo
+            links = [settings.link.connect for settings in alone.values()]
+            log.info("link: %s", ", ".join(links))
+            return links
+        what = "the built-in mock autopilot" if len(alone) == 1 else f"{len(alone)} built-in mock autopilots"
         log.info(
-            "no --connect: flying the built-in mock autopilot (%s, %gx real time) with a simulated detector "
+            "no --connect: flying %s (%s, %gx real time) with a simulated detector "
             "and a simulated target; nothing real moves",
-            demo.flavor,
+            what,
+            ", ".join(settings.demo.flavor for settings in alone.values()),
             self.settings.speedup,
         )
-        self.world = await World.start(self.search.grid, self.settings)
-        return self.world.url
+        self.world = await DemoWorld.start(self.search.grid, self.settings, self.lockstep)
+        return self.world.urls
 
-    async def _run_mission(self, mission: Mission) -> None:
-        """Run the mission beside the display; a signal asks it to return, a second one ends it at once."""
+    async def _run_squad(self, squad: Squad) -> None:
+        """Run the missions beside the display; a signal asks them to return, a second one ends them at once."""
         loop = asyncio.get_running_loop()
-        flying = asyncio.create_task(mission.run())
-        orders: set[asyncio.Task[str]] = set()
+        orders: set[asyncio.Task[OrderReceipt]] = set()
 
         def stop(name: str) -> None:
             if orders:
                 log.warning("%s again: leaving the aircraft to its autopilot", name)
-                flying.cancel()
-            else:
-                pilots = mission.state == State.YIELDED  # it is not taken from the pilot
-                order = "return" if mission.flight.began and not pilots else "abort"
-                log.warning("%s: %s (once more to leave the aircraft to its autopilot)", name, order)
+                squad.cancel()
+                return
+            for mission in squad.missions.values():
+                stays = mission.state in (State.YIELDED, State.GROUNDED)  # it is not taken from the pilot
+                order = "home" if mission.flight.began and not stays else "leave"
+                said = "%s%s: %s (once more to leave the aircraft to its autopilot)"
+                log.warning(said, mission.called, name, order)
                 orders.add(asyncio.create_task(mission.order(order)))
 
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, stop, number.name)
-        display = asyncio.create_task(show(self.console, self.view.state))
-        watch = asyncio.create_task(self._watch_world(mission))
+        beside = [
+            asyncio.create_task(show(self.prepared.console, self.view.state)),
+            asyncio.create_task(self._watch_world(squad)),
+            *([asyncio.create_task(self.lockstep.keep_up())] if self.lockstep else []),
+        ]
         try:
-            await flying
-        except* (LinkError, JournalLost) as group:
-            for error in group.exceptions:
-                log.error("%s", error)
-            await mission.leave(str(group.exceptions[0]))
-        except* asyncio.CancelledError:
-            await mission.leave("stopped by a signal", stop=False)
-        except* Exception as group:  # a mistake of ours: the aircraft does not fly on into it
-            await mission.leave(f"internal error, {group.exceptions[0]!r}")
-            raise
+            await squad.run()
         finally:
-            display.cancel()
-            watch.cancel()
+            for each in beside:
+                each.cancel()
+            if self.lockstep is not None:
+                self.lockstep.leave()
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.remove_signal_handler(number)
 
-    async def _watch_world(self, mission: Mission) -> None:
-        """End the run when a process of the built-in world is gone: there is nothing left to fly."""
-        if self.world is not None:
-            gone = await self.world.ended()
+    async def _watch_world(self, squad: Squad) -> None:
+        """When a process of the built-in world is gone, its aircraft has nothing left to fly for."""
+        while self.world is not None and not squad.ended:
+            gone, number = await self.world.ended()
+            mission = list(squad.missions.values())[number]
             if mission.state not in FINAL:
                 log.error("%s has ended", gone)
                 await mission.order("abort")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from importlib.metadata import version
 
 COMMANDS: dict[str, tuple[str, str]] = {
     # command: (module with main(arguments) -> exit code, one line of help)
@@ -11,8 +12,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "autopilot": ("sim.autopilot.cli", "a mock PX4 or ArduPilot on a real socket"),
     "bench": (
         "sim.bench",
-        "the planner against its plain twin; 'bench intake': reports; 'bench autopilot': many mocks",
+        "the planner against its plain twin; 'bench intake': reports; 'bench autopilot': many mocks; "
+        "'bench strangers': what the flight feels of attacks",
     ),
+    "climbing": ("sim.climbing", "what it is worth that a plan knows how long climbs take"),
     "detector": ("sim.detector", "a simulated detector that follows the aircraft"),
     "flights": ("sim.flights", "whole searches with the real service, counted"),
     "soak": ("sim.soak.cli", "flights under random faults, with everything judged that must never happen"),
@@ -32,6 +35,9 @@ def main(arguments: list[str] | None = None) -> int:
     if not words or words[0] in ("-h", "--help"):
         print(usage())
         return 0 if words else 2
+    if words[0] == "--version":
+        print(f"roisearch {version('roisearch')}")
+        return 0
     if words[0] not in COMMANDS:
         print(f"roisearch-sim: no command '{words[0]}'; one of: {', '.join(COMMANDS)}", file=sys.stderr)
         return 2

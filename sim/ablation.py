@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from roisearch import PLANNERS, Belief, Decision, FieldOfView, Planner, SearchState, make_planner
 from roisearch.bounds import expected_time, multi_cell, release, teleport_reference
 from roisearch.planners.base import Progress
-from roisearch.planners.sweep import SweepPlanner
-from roisearch.planners.sweep_settings import SweepSettings
-from sim.ruler import detection_curve
-from sim.scenario import PAPER_START, PAPER_STEPS, paper_prior
+from roisearch.planners.lookahead.planner import LookaheadPlanner
+from roisearch.planners.lookahead.settings import LookaheadSettings
+from sim.ruler import Ruler, detection_curve
+from sim.scenario import EQUAL, PAPER_START, PAPER_STEPS, paper_prior
 
 P_TP = 0.9
 VARIANTS = "iterations=0 iterations=1,horizon=3000 iterations=16,horizon=5000"
@@ -78,14 +78,14 @@ def planner_named(name: str, fov: FieldOfView) -> Planner:
     """
     if name in PLANNERS:
         return make_planner(name, fov=fov)
-    types = {field.name: str(field.type) for field in dataclasses.fields(SweepSettings)}
+    types = {field.name: str(field.type) for field in dataclasses.fields(LookaheadSettings)}
     values: dict[str, Any] = {}
     for part in name.split(","):
         key, _, value = part.partition("=")
         if key not in types:
             raise ValueError(f"'{key}' is neither a planner nor one of the settings {', '.join(types)}")
         values[key] = float(value) if types[key] == "float" else int(value)
-    return SweepPlanner(SweepSettings(**values), fov=fov)
+    return LookaheadPlanner(LookaheadSettings(**values), fov=fov)
 
 
 def field_of_view(name: str, p_tn: float) -> FieldOfView:
@@ -116,10 +116,10 @@ def fly(variant: str, seed: int, draw: int, options: argparse.Namespace) -> Row:
     prior = paper_prior(np.random.default_rng(seed), equal=options.equal)
     planner = Clocked(planner_named(variant, fov))  # a new one: it takes its regions from the first belief
     deadline = None if options.deadline_ms is None else options.deadline_ms / 1000.0
-    curve = detection_curve(
-        planner, prior, PAPER_START, P_TP, PAPER_STEPS, np.random.default_rng((seed, draw)), options.p_tn, fov,
-        deadline_s=deadline, stop_below=options.stop_below, follow=variant not in PLANNERS and options.p_tn == 1.0,
-    )  # fmt: skip
+    follow = variant not in PLANNERS and options.p_tn == 1.0
+    ruler = Ruler(P_TP, options.p_tn, fov, deadline, options.stop_below, follow)
+    rng = np.random.default_rng((seed, draw))
+    curve = detection_curve(planner, prior, PAPER_START, PAPER_STEPS, ruler, rng)
     first, others = planner.milliseconds()
     numbers = [expected_time(curve), reference_time(prior, fov, options.p_tn, (seed, draw))]
     clocks = [*first, *others[:, 0], *others[:, 1]]
@@ -235,7 +235,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--fov", choices=("point", "donut", "wide-angle"), default="point")
     p.add_argument("--p-tn", type=float, default=1.0, help="P(no hit | target not there) (default 1)")
     p.add_argument("--draws", type=int, default=1, help="draws of false alarms for each prior (default 1)")
-    p.add_argument("--equal", choices=("height", "mass"), default="height", help="what the Gaussians share")
+    p.add_argument("--equal", choices=EQUAL, default="height", help="what the Gaussians share")
     p.add_argument("--deadline-ms", type=float, help="handed to plan() at every step (not repeatable)")
     p.add_argument("--stop-below", type=float, default=5e-5, help="undetected mass at which F is held")
     p.add_argument("--out", type=Path, default=Path("ablation"), help="folder of the results")

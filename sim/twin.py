@@ -14,12 +14,11 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from roisearch.decision import AHEAD
+from roisearch.decision import AHEAD, Cell
 from roisearch.fov import HEADINGS, FieldOfView
-from roisearch.planners.settings import PuctSettings
+from roisearch.planners.puct.settings import PuctSettings
 from roisearch.regions import Regions
 
-Cell = tuple[int, int]
 STEPS = ((-1, 0), (0, 1), (1, 0), (0, -1))
 TURNS = (0, 1, 3, 2)  # straight on, right, left, back
 MASK = (1 << 64) - 1

@@ -28,14 +28,23 @@ FLIGHTS = ("tests/browser/", "tests/integration/")
 """Files whose tests keep time with other processes: one worker does them one at a time, whatever the other computes."""
 LATE_FLIGHTS = (
     "tests/conformance/test_over_sockets",
+    "tests/integration/test_exports_of_others",
     "tests/integration/test_faults_pilot",
+    "tests/integration/test_news",
+    "tests/integration/test_restart",
     "tests/integration/test_search",
-    "tests/service/test_mavlink_vehicle",
-    "tests/sim/test_autopilot_mav",
+    "tests/integration/test_sorties",
+    "tests/service/mavlink/test_vehicle",
+    "tests/sim/autopilot/test_mav",
     "tests/sim/test_bench",
+    "tests/typed/",
 )
 """Those that the other worker does when it has computed everything: by then all kernels are compiled, and two flights
 at a time do not disturb each other."""
+
+
+COMPILES = ("tests/roisearch/", "tests/sim/trials/")
+"""Files that need most kernels: begun when the other worker, which flies, has compiled them."""
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -51,6 +60,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
             return "flights" if file.startswith(FLIGHTS) else file
 
         def _assign_work_unit(self, node: Any) -> None:
+            for last in [file for file in self.workqueue if file.startswith(COMPILES)]:
+                self.workqueue.move_to_end(last)
             if "late" in self.workqueue:
                 self.workqueue.move_to_end("late")
             super()._assign_work_unit(node)

@@ -113,4 +113,4 @@ def peak_cell(root: int, weights: Floats, forest: Forest) -> int:
 @kernel
 def find_peak(root: int, weights: Floats, cell_of: Ints, first: Ints, last: Ints, peaks: Floats) -> int:
     """`peak_cell` to be called from Python."""
-    return peak_cell(root, weights, Forest(cell_of, first, last, last.reshape(-1, 1), peaks))
+    return peak_cell(root, weights, Forest(cell_of, first, last, last.reshape(-1, 1), last, peaks))

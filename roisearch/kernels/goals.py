@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from roisearch.kernels.compiled import kernel
-from roisearch.kernels.forest import peak_cell
-from roisearch.kernels.ground import find_sources, flood, open_steps
-from roisearch.kernels.records import FAR, PEAK_GOAL, Aims, Floats, Forest, Ints, Land, Sight, Steps
+from roisearch.kernels.ground import find_sources, open_steps
+from roisearch.kernels.records import FAR, Floats, Forest, Ints, Land, Pose, Ranging, Sight, Steps
 
 
 @kernel
 def steps_from(row: int, col: int, goal: int, land: Land, sight: Sight, forward: Steps, sources: Ints) -> int:
-    """Steps from (row, col) until `goal` has been looked at; `forward` [cells] as in `index_cell`."""
+    """Steps from (row, col) until `goal` has been looked at; `forward` as in `Ranging`."""
     count = 0
     if forward.size > 0 or not sight.is_point:
         count = find_sources(goal, land, sight, sources)
@@ -25,25 +24,22 @@ def steps_from(row: int, col: int, goal: int, land: Land, sight: Sight, forward:
 @kernel
 def index_cell(
     root: int,
-    row: int,
-    col: int,
+    pose: Pose,
     weights: Floats,
     forest: Forest,
     land: Land,
     sight: Sight,
-    reach: int,
-    worth: Floats,
-    forward: Steps,
+    ranging: Ranging,
     sources: Ints,
-    stack: Ints,
 ) -> tuple[int, float]:
     """The cell below `root` with the largest weight * worth[steps], and that score; (-1, 0) without any.
 
-    `worth` [steps] falls with the steps; steps ** (-1 / alpha) makes this the argmax of m ** alpha / steps.
-    Branch and bound: a node is skipped when even its peak, as near as its box and the sensor's `reach` allow,
-    is no better than the best cell so far. `forward` [cells], the steps from (row, col) around obstacles, is
-    empty on open ground.
+    With worth[steps] = steps ** (-1 / alpha) this is the argmax of m ** alpha / steps. Branch and bound: a node is
+    skipped when even its peak, as near as its box and the sensor's reach allow, is no better than the best cell so
+    far. `sources` [4 k, 3] is room.
     """
+    row, col = pose.row, pose.col
+    worth, reach, stack = ranging.worth, ranging.reach, ranging.stack
     best, best_cell = 0.0, -1
     far = worth.size - 1
     box = forest.box
@@ -69,61 +65,8 @@ def index_cell(
             apart = max(abs(cell // land.cols - row) + abs(cell % land.cols - col) - reach, 1)
             if weights[cell] * worth[min(apart, far)] <= best:
                 continue
-            steps = steps_from(row, col, cell, land, sight, forward, sources)
+            steps = steps_from(row, col, cell, land, sight, ranging.forward, sources)
             score = weights[cell] * worth[min(steps, far)] if steps < FAR else 0.0
             if score > best:
                 best, best_cell = score, cell
     return best_cell, best
-
-
-@kernel
-def set_goals(
-    rule: int,
-    row: int,
-    col: int,
-    roots: Ints,
-    weights: Floats,
-    forest: Forest,
-    land: Land,
-    sight: Sight,
-    reach: int,
-    worth: Floats,
-    forward: Steps,
-    queue: Ints,
-    field_goals: Ints,
-    stack: Ints,
-    aims: Aims,
-) -> None:
-    """Fill `aims`: each region's goal (-1: nothing to find), its sources, the way around obstacles.
-
-    `field_goals` [regions] tells which goals the fields were made for: an unchanged goal keeps its field.
-    """
-    if forward.size > 0 and rule != PEAK_GOAL:
-        stack[0] = row * land.cols + col
-        flood(stack[:1], 0, land.legal, land.cols, forward, queue)
-    for region in range(roots.size):
-        goal = -1
-        if roots[region] >= 0:
-            if rule == PEAK_GOAL:
-                goal = peak_cell(roots[region], weights, forest)
-            else:
-                goal, _ = index_cell(
-                    roots[region], row, col, weights, forest, land, sight, reach, worth, forward,
-                    aims.sources[region], stack,
-                )  # fmt: skip
-        aims.goals[region, 0] = goal
-        if goal < 0:
-            continue
-        aims.goals[region, 1] = goal // land.cols
-        aims.goals[region, 2] = goal % land.cols
-        aims.counts[region] = find_sources(goal, land, sight, aims.sources[region])
-        if aims.fields.shape[0] > 0 and goal != field_goals[region]:
-            flood(
-                aims.sources[region, : aims.counts[region], 0],
-                1,
-                land.legal,
-                land.cols,
-                aims.fields[region],
-                queue,
-            )
-            field_goals[region] = goal

@@ -14,9 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch.kernels.compiled import allocating_kernel, kernel
+from roisearch.kernels.handover import Layout, array
 
 FANOUT = 16
 MOST_COUNTED = 32_000
+
+WEIGHTS = Layout(
+    # [rows * cols] by rows, and their sums and offsets as in this module's first lines
+    weights=(np.float64, 1),
+    sums=(np.float64, 1),
+    offsets=(np.int64, 1),
+    cols=np.int64,
+)
+opened = WEIGHTS.opener()
 
 OK, OUT_OF_MAP, BAD_PROBABILITY, IMPOSSIBLE, CERTAIN = 0, 1, 2, 3, 4
 
@@ -65,12 +75,8 @@ def resum(
 
 @allocating_kernel
 def apply_looks(
-    weights: NDArray[np.float64],
-    sums: NDArray[np.float64],
-    offsets: NDArray[np.int64],
-    tally: NDArray[np.int16],
+    parcel: int,
     outside: float,
-    cols: int,
     cells: NDArray[np.int64],
     hits: NDArray[np.bool_],
     p_tp: NDArray[np.float64],
@@ -79,8 +85,7 @@ def apply_looks(
     """Multiply the odds of each looked-at cell.
 
     Args:
-        weights: [rows * cols], changed in place; `sums` and `offsets` as in this module's first lines.
-        tally: [cells, 2], the misses and hits so far, changed in place; at MOST_COUNTED it stays.
+        parcel: address of what `WEIGHTS` packed; weights and sums are changed in place.
         outside: weight of 'not in the area'; no look changes it.
         cells: row and column, [k, 2].
         hits, p_tp, p_tn: [k], or [1] for all looks alike.
@@ -89,6 +94,8 @@ def apply_looks(
         (OK, number of hits); or why not, the look at fault, and nothing has changed. CERTAIN is a hit with
         p_tn = 1, whose odds are infinite.
     """
+    given = opened(parcel)
+    weights, sums, offsets, cols = array(given.weights), array(given.sums), array(given.offsets), given.cols
     rows = weights.size // cols
     found = 0
     for look in range(cells.shape[0]):
@@ -113,12 +120,19 @@ def apply_looks(
             weights[cell] *= (1.0 - tp) / tn
         resum(cell, weights, sums, offsets)
     if sums[-1] + outside > 0.0 and np.isfinite(sums[-1]):
-        for look in range(cells.shape[0]):
-            cell, kind = cells[look, 0] * cols + cells[look, 1], 1 if hits[look % hits.size] else 0
-            tally[cell, kind] = min(tally[cell, kind] + 1, MOST_COUNTED)
         return OK, found
     for look in range(cells.shape[0] - 1, -1, -1):
         cell = cells[look, 0] * cols + cells[look, 1]
         weights[cell] = before[look]
         resum(cell, weights, sums, offsets)
     return IMPOSSIBLE, 0
+
+
+@kernel
+def count_looks(
+    tally: NDArray[np.int16], cols: int, cells: NDArray[np.int64], hits: NDArray[np.bool_]
+) -> None:
+    """Add to `tally` [cells, 2], the misses and hits so far; at MOST_COUNTED it stays."""
+    for look in range(cells.shape[0]):
+        cell, kind = cells[look, 0] * cols + cells[look, 1], 1 if hits[look % hits.size] else 0
+        tally[cell, kind] = min(tally[cell, kind] + 1, MOST_COUNTED)

@@ -7,23 +7,38 @@ import numpy as np
 from roisearch.kernels.compiled import allocating_kernel, kernel
 from roisearch.kernels.goals import index_cell
 from roisearch.kernels.ground import col_step, find_sources, flood, row_step
-from roisearch.kernels.records import Aims, Bits, Floats, Forest, Ints, Land, Mass, Sight, Steps
+from roisearch.kernels.groups import FOREST, LAND, RANGING, SIGHT
+from roisearch.kernels.handover import Layout, array
+from roisearch.kernels.records import Aims, Floats, Forest, Ints, Land, Mass, Pose, Ranging, Sight, Steps
 from roisearch.kernels.sensing import gain_at
 from roisearch.kernels.trips import walk_trip
+
+INDEX = Layout(
+    **FOREST,
+    **LAND,
+    **SIGHT,
+    **RANGING,
+    # see `go_to`, and [regions] room for the scores
+    field=(np.int32, 2),
+    scores=(np.float64, 1),
+    path=(np.int64, 2),
+)
+HORIZON = Layout(
+    # how far, and [2 horizon + 1, 2 horizon + 1] and [2 n] room for the moves and the cells on the way
+    horizon=np.int64,
+    window=(np.int32, 2),
+    queue=(np.int64, 1),
+    **LAND,
+    **SIGHT,
+    # [2, horizon] room for the cells to enter
+    path=(np.int64, 2),
+)
+opened_index, opened_horizon = INDEX.opener(), HORIZON.opener()
 
 
 @allocating_kernel
 def go_to(
-    row: int,
-    col: int,
-    heading: int,
-    goal: int,
-    weights: Floats,
-    land: Land,
-    sight: Sight,
-    field: Steps,
-    queue: Ints,
-    path: Ints,
+    pose: Pose, goal: int, weights: Floats, land: Land, sight: Sight, field: Steps, queue: Ints, path: Ints
 ) -> int:
     """Write the trip to a look at `goal` into `path`; how many cells. `field`: [1, cells], [0, ..] open."""
     sources = np.empty((1, 4 * sight.offsets.shape[1], 3), dtype=np.int64)
@@ -32,86 +47,64 @@ def go_to(
         flood(sources[0, :count, 0], 1, land.legal, land.cols, field[0], queue)
     goals = np.array([[goal, goal // land.cols, goal % land.cols]])
     nothing = np.zeros(1)
-    aims = Aims(goals, sources, np.full(1, count), nothing, np.zeros((1, 2)), field)
+    aims = Aims(goals, sources, np.full(1, count), nothing, np.zeros((1, 2)), field, goals[0])
     mass = Mass(weights, nothing, False, goals[0])
-    return walk_trip(row, col, heading, 0, land, mass, sight, aims, path)
+    return walk_trip(pose, 0, land, mass, sight, aims, path)
 
 
 @allocating_kernel
 def follow_index(
-    cell: int,
-    heading: int,
-    weights: Floats,
-    peaks: Floats,
-    cell_of: Ints,
-    first: Ints,
-    last: Ints,
-    box: Ints,
-    roots: Ints,
-    legal: Bits,
-    cols: int,
-    offsets: Ints,
-    gains: Floats,
-    is_point: bool,
-    reach: int,
-    worth: Floats,
-    forward: Steps,
-    field: Steps,
-    queue: Ints,
-    stack: Ints,
-    scores: Floats,
-    path: Ints,
+    cell: int, heading: int, weights: Floats, peaks: Floats, parcel: int
 ) -> tuple[int, int, int]:
     """The region of the cell most worth its distance, that cell, and how many cells of `path` lead to it.
 
-    `scores` [regions] becomes each region's best weight * worth[steps]; (-1, -1, 0) when there is
-    nothing anywhere.
+    `parcel` is what `INDEX` packed, of which `scores` becomes each region's best weight * worth[steps]; `peaks` are
+    of the nodes of the forest. (-1, -1, 0) when there is nothing anywhere.
     """
-    land = Land(legal, weights.size // cols, cols)
-    sight = Sight(offsets, gains, gains, is_point)
-    forest = Forest(cell_of, first, last, box, peaks)
-    row, col = cell // cols, cell % cols
+    given = opened_index(parcel)
+    cols, roots, scores = given.cols, array(given.roots), array(given.scores)
+    land = Land(array(given.legal), weights.size // cols, cols)
+    offsets, gains = array(given.offsets), array(given.gains)
+    sight = Sight(offsets, gains, gains, given.is_point)
+    forest = Forest(
+        array(given.cell_of), array(given.first), array(given.last), array(given.box), roots, peaks
+    )
+    forward, queue = array(given.forward), array(given.queue)
+    ranging = Ranging(array(given.worth), given.reach, forward, queue, array(given.stack))
+    pose = Pose(cell // cols, cell % cols, heading)
     sources = np.empty((4 * offsets.shape[1], 3), dtype=np.int64)
     if forward.size > 0:
-        flood(np.full(1, cell), 0, legal, cols, forward, queue)
+        flood(np.full(1, cell), 0, land.legal, cols, forward, queue)
     best, goal = -1, -1
     for region in range(roots.size):
         scores[region] = 0.0
         if roots[region] < 0:
             continue
         there, scores[region] = index_cell(
-            roots[region], row, col, weights, forest, land, sight, reach, worth, forward, sources, stack
+            roots[region], pose, weights, forest, land, sight, ranging, sources
         )
         if there >= 0 and (best < 0 or scores[region] > scores[best]):
             best, goal = region, there
     if best < 0:
         return -1, -1, 0
-    return best, goal, go_to(row, col, heading, goal, weights, land, sight, field, queue, path)
+    path = array(given.path)
+    return best, goal, go_to(pose, goal, weights, land, sight, array(given.field), queue, path)
 
 
 @kernel
-def follow_horizon(
-    cell: int,
-    heading: int,
-    horizon: int,
-    weights: Floats,
-    legal: Bits,
-    cols: int,
-    offsets: Ints,
-    gains: Floats,
-    is_point: bool,
-    window: Steps,
-    queue: Ints,
-    path: Ints,
-) -> tuple[float, int]:
-    """The best mass in view within `horizon` steps, and how many cells of `path` lead there; (0, 0) if none.
+def follow_horizon(cell: int, heading: int, weights: Floats, parcel: int) -> tuple[float, int]:
+    """The best mass in view within the horizon, and how many cells of `path` lead there; (0, 0) if none.
 
-    Breadth-first over `window` [2 horizon + 1, 2 horizon + 1], straight on first, then right, left and back;
-    a cell is valued as seen on arrival. Of equal values the one found first, so the nearest, wins. `window`
-    holds the move by which each cell was first entered, -1 for none.
+    `parcel` is what `HORIZON` packed. Breadth-first over the window, straight on first, then right, left and back; a
+    cell is valued as seen on arrival. Of equal values the one found first, so the nearest, wins. The window holds the
+    move by which each cell was first entered, -1 for none.
     """
+    given = opened_horizon(parcel)
+    cols, legal, horizon = given.cols, array(given.legal), given.horizon
+    gains, window = array(given.gains), array(given.window)
+    queue, path = array(given.queue), array(given.path)
     land = Land(legal, weights.size // cols, cols)
-    sight = Sight(offsets, gains, gains, is_point)
+    sight = Sight(array(given.offsets), gains, gains, given.is_point)
     mass = Mass(weights, gains, False, queue)
     row, col = cell // cols, cell % cols
     window[:] = -1

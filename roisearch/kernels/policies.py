@@ -3,45 +3,45 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roisearch.kernels.compiled import kernel
+from roisearch.kernels.draws import draw_move, draw_unit
 from roisearch.kernels.ground import col_step, row_step
-from roisearch.kernels.records import Bits, Floats, Ints, Land, Mass, Sight
-from roisearch.kernels.rollouts import draw_move, draw_unit
+from roisearch.kernels.groups import FADING, LAND, SIGHT
+from roisearch.kernels.handover import Layout, array
+from roisearch.kernels.records import Floats, Land, Mass, Sight
 from roisearch.kernels.sensing import fade_at, gain_at, restore
+
+WALKS = Layout(
+    horizon=np.int64,
+    epsilon=np.float64,
+    # uint64 [1], see `roisearch.kernels.draws`
+    random=(np.uint64, 1),
+    **LAND,
+    **SIGHT,
+    **FADING,
+    # [2, horizon] room for a walk, and for the best
+    trial=(np.int64, 2),
+    path=(np.int64, 2),
+)
+opened = WALKS.opener()
 
 
 @kernel
-def search_policies(
-    cell: int,
-    heading: int,
-    rollouts: int,
-    horizon: int,
-    epsilon: float,
-    state: NDArray[np.uint64],
-    weights: Floats,
-    fade: Floats,
-    fades: bool,
-    log: Ints,
-    legal: Bits,
-    cols: int,
-    offsets: Ints,
-    gains: Floats,
-    miss: Floats,
-    is_point: bool,
-    trial: Ints,
-    path: Ints,
-) -> float:
-    """Direct policy search: the best of `rollouts` epsilon-greedy walks of `horizon` moves goes into `path`.
+def search_policies(cell: int, heading: int, rollouts: int, weights: Floats, parcel: int) -> float:
+    """Direct policy search: the best of `rollouts` epsilon-greedy walks goes into `path`.
 
-    With probability epsilon a move is random, else it goes to the neighbour that sees most. Returns the sum
-    of the weights seen, which fade by 1 - p_tp within a walk when `fades`.
+    `parcel` is what `WALKS` packed. With probability epsilon a move is random, else it goes to the neighbour that sees
+    most. Returns the sum of the weights seen, which fade by 1 - p_tp within a walk when `fades`.
     """
+    given = opened(parcel)
+    cols, legal, fades = given.cols, array(given.legal), given.fades
+    horizon, epsilon, state = given.horizon, given.epsilon, array(given.random)
+    trial, path = array(given.trial), array(given.path)
     from_row, from_col = cell // cols, cell % cols
     land = Land(legal, weights.size // cols, cols)
-    sight = Sight(offsets, gains, miss, is_point)
-    mass = Mass(weights, fade, fades, log)
+    sight = Sight(array(given.offsets), array(given.gains), array(given.miss), given.is_point)
+    mass = Mass(weights, array(given.fade), fades, array(given.log))
     best = -1.0
     for _ in range(rollouts):
         row, col, facing, logged, total = from_row, from_col, heading, 0, 0.0

@@ -1,7 +1,7 @@
 """What the kernels pass around, grouped by meaning. Built inside compiled code, where a named tuple is free.
 
 Cells are flat indices, row * cols + col, unless a row and a column are given; moves and headings are 0 north,
-1 east, 2 south, 3 west; actions 0-3 are the moves and 4 + k the option to go to the goal of region k.
+1 east, 2 south, 3 west.
 """
 
 from __future__ import annotations
@@ -18,6 +18,14 @@ Bits = NDArray[np.uint8]
 
 FAR = 1 << 30
 """The distance of what cannot be reached."""
+
+
+class Pose(NamedTuple):
+    """Where the drone is, and the direction of its last move."""
+
+    row: int
+    col: int
+    heading: int
 
 
 class Land(NamedTuple):
@@ -56,7 +64,7 @@ class Aims(NamedTuple):
 
     `counts` [regions] tells how many sources there are, `means` [regions] the mean weight of a region's
     cells, `centroids` [regions, 2] its middle; `fields` [regions, cells] the steps to the goal around
-    obstacles, [0, cells] on open ground.
+    obstacles, [0, cells] on open ground, and `made_for` [regions] the goals that they were made for.
     """
 
     goals: Ints
@@ -65,66 +73,29 @@ class Aims(NamedTuple):
     means: Floats
     centroids: Floats
     fields: Steps
+    made_for: Ints
 
 
 class Forest(NamedTuple):
-    """The regions as trees; see `kernels.forest`."""
+    """The regions as trees; see `kernels.forest`. `root` [regions], -1 for a region that is left out."""
 
     cell_of: Ints
     first: Ints
     last: Ints
     box: Ints
+    root: Ints
     peaks: Floats
 
 
-class Rules(NamedTuple):
-    """The settings of the search; see `PuctSettings`. `scale` makes a weight a probability."""
+class Ranging(NamedTuple):
+    """What a distance leaves of a weight, and the distances from where the drone is.
 
-    rollout: int
-    rollout_policy: int
-    option_reward: int
-    backup: int
-    normalise: bool
-    prior: int
-    explore: float
-    discount: float
-    penalty: float
-    density: float
-    alpha: float
-    floor: float
-    scale: float
-
-
-class Tree(NamedTuple):
-    """The search tree, a struct of arrays.
-
-    `child` [nodes, actions] is a node or -1; `stats` [nodes, 5, actions] is P(a) (-1: illegal), the sum or
-    the best of the returns, the visits n, the value, and P(a) / (1 + n); `visits` [nodes]; `trail` [depth,
-    4] the way down: node, action, reward, discount; `span` [2] the least and the largest value so far;
-    `decay` [n] the discount of n steps.
+    `worth` [steps] falls with the steps; `reach` is the most moves between the drone and a cell that it sees.
+    `forward` [cells] has the steps around obstacles, [0] on open ground; `queue` [cells], `stack` [n] are room.
     """
 
-    child: Steps
-    stats: Floats
-    visits: Floats
-    trail: Floats
-    span: Floats
-    decay: Floats
-
-
-# Rules.rollout_policy
-RANDOM, REPEAT, STEEPEST = 0, 1, 2
-# Rules.option_reward
-DENSITY, TRIP = 0, 1
-# Rules.backup
-MEAN, MAX = 0, 1
-# Rules.prior
-UNIFORM, REWARDS, INDEX = 0, 1, 2
-# which root action is chosen
-VISITS, VALUE = 0, 1
-# the goal of an option: its region's peak, or the cell most worth its distance
-PEAK_GOAL, INDEX_GOAL = 0, 1
-# rows of a node in Tree.stats
-P_A, WORTH, N_A, VALUE_A, SHARE = 0, 1, 2, 3, 4
-# Tree.span
-LOW, HIGH = 0, 1
+    worth: Floats
+    reach: int
+    forward: Steps
+    queue: Ints
+    stack: Ints

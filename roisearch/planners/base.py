@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from roisearch.fov import HEADINGS, FieldOfView, heading_index
 from roisearch.ground import Ground, Part
 from roisearch.kernels.forest import find_peak
 from roisearch.kernels.ground import cell_step
+from roisearch.motion import Motion
 from roisearch.regions import Regions, segment_regions
 
 Progress = Callable[[str, int, int], None]
@@ -24,7 +25,7 @@ Progress = Callable[[str, int, int], None]
 
 
 class Planner(Protocol):
-    """A planner: belief and state in, decision out."""
+    """A planner: belief and state in, decision out. `roisearch.BasePlanner` has all of it but the choice."""
 
     name: str
 
@@ -52,6 +53,31 @@ class Planner(Protocol):
         ...
 
 
+@runtime_checkable
+class InSeconds(Protocol):
+    """A planner that plans by a motion, and takes another one when more is known."""
+
+    def reckon_with(self, motion: Motion) -> None:
+        """Let the ways cost what `motion` says from now on; it has the same cells and neighbours."""
+        ...
+
+
+@runtime_checkable
+class Redrawable(Protocol):
+    """A planner that goes on with other regions of the same map."""
+
+    def redraw(self, regions: Regions) -> Callable[[], None]:
+        """Get ready for other regions, which takes long on a large map: in any thread, beside `plan`.
+
+        Returns what makes the planner reckon with them, which takes no longer than a decision may: to be called where
+        `plan` is, between two of its calls.
+
+        Raises:
+            ValueError: when the regions are of another map.
+        """
+        ...
+
+
 @dataclass(eq=False)
 class Scene:
     """A connected part of the map with its regions as trees.
@@ -60,7 +86,7 @@ class Scene:
         ground: the flyable ground, and `part` the connected piece of it that the drone is on.
         forest: tree 0 is the viewable ground outside all regions, 1 .. regions the regions of interest, and
             the last one what cannot be seen from this part.
-        centroids: float [1 + regions, 2].
+        centroids: float [1 + regions, 2]. A bare scene has neither: its one tree is of what cannot be seen.
     """
 
     ground: Ground
@@ -94,10 +120,17 @@ class Scene:
 
 
 class World:
-    """The map of one search as a planner keeps it: built at the first plan, one scene a connected part."""
+    """The map of one search as a planner keeps it: built at the first plan, one scene a connected part.
 
-    def __init__(self, fov: FieldOfView, flyable: ArrayLike | None, regions: Regions | None) -> None:
+    `bare`: the scenes have trees over no cells but those that cannot be seen, for a planner that keeps sums and peaks
+    in a way of its own.
+    """
+
+    def __init__(
+        self, fov: FieldOfView, flyable: ArrayLike | None, regions: Regions | None, *, bare: bool = False
+    ) -> None:
         self.fov = fov
+        self._bare = bare
         self._flyable = None if flyable is None else np.array(flyable, dtype=bool)
         self._regions = regions
         self._ground: Ground | None = None
@@ -124,18 +157,38 @@ class World:
             self._whole = scene if self._ground.is_open else None
         return scene
 
+    def redrawn(self, regions: Regions) -> World:
+        """The same ground with other regions; the parts that were entered are laid out again."""
+        other = World(self.fov, self._flyable, regions, bare=self._bare)
+        if self._ground is not None:
+            other._ground = self._ground
+            other._scenes = {
+                label: _lay_out(self._ground, scene.part, regions, self._bare)
+                for label, scene in list(self._scenes.items())
+            }
+            if self._whole is not None:
+                other._whole = other._scenes[self._whole.part.label]
+        return other
+
     def _survey(self, belief: Belief, ground: Ground, part: Part) -> Scene:
         if self._regions is None:
             prior = belief.probability()
             self._regions = segment_regions(prior, searchable=prior > 0.0)
-        regions = self._regions
-        if regions.labels.shape != belief.shape:
-            raise ValueError(f"the regions have the shape {regions.labels.shape}, the belief {belief.shape}")
-        labels = np.where(part.viewable, regions.labels, regions.count + 1)
-        rest = np.argwhere(labels == 0) if regions.count else np.zeros((0, 2))
-        middle = rest.mean(axis=0) if len(rest) else np.array(belief.shape) / 2.0
-        centroids = np.ascontiguousarray(np.vstack([middle, regions.centroids]))
-        return Scene(ground, part, Forest(labels, regions.count + 2), centroids)
+        return _lay_out(ground, part, self._regions, self._bare)
+
+
+def _lay_out(ground: Ground, part: Part, regions: Regions, bare: bool) -> Scene:
+    """The scene of a part of the ground. Raises ValueError when the regions are of another map."""
+    if regions.labels.shape != ground.shape:
+        raise ValueError(f"the regions have the shape {regions.labels.shape}, the belief {ground.shape}")
+    if bare:
+        none = np.zeros((0, 2))
+        return Scene(ground, part, Forest(np.where(part.viewable, np.int8(-1), np.int8(0)), 1), none)
+    labels = np.where(part.viewable, regions.labels, regions.count + 1)
+    rest = np.argwhere(labels == 0) if regions.count else np.zeros((0, 2))
+    middle = rest.mean(axis=0) if len(rest) else np.array(ground.shape) / 2.0
+    centroids = np.ascontiguousarray(np.vstack([middle, regions.centroids]))
+    return Scene(ground, part, Forest(labels, regions.count + 2), centroids)
 
 
 def cells_of(path: NDArray[np.int64], length: int) -> tuple[Cell, ...]:

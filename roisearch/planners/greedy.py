@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from roisearch.belief import Belief
 from roisearch.decision import Decision, Effort, SearchState
 from roisearch.fov import FieldOfView, heading_index
-from roisearch.kernels.onestep import follow_horizon
+from roisearch.kernels.onestep import HORIZON, follow_horizon
 from roisearch.planners.base import Progress, Scene, World, any_move, cells_of, remark_on
+from roisearch.planners.packing import land_of, sight_of
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions
 
@@ -43,10 +44,21 @@ class GreedyPlanner:
         self._world = World(fov, flyable, regions)
         self._fov = fov
         self._horizon = horizon
-        self._window = np.zeros((2 * horizon + 1, 2 * horizon + 1), dtype=np.int32)
-        self._queue = np.zeros(2 * self._window.size, dtype=np.int64)
+        self._scene: Scene | None = None
         self._path = np.zeros((2, horizon), dtype=np.int64)
-        self._gains = np.ones(len(fov.p_tp))
+
+    def _enter(self, scene: Scene) -> None:
+        """Make room for everything that depends on the map."""
+        self._scene = scene
+        side = 2 * self._horizon + 1
+        self._parcel = HORIZON.pack(
+            horizon=self._horizon,
+            window=np.zeros((side, side), dtype=np.int32),
+            queue=np.zeros(2 * side**2, dtype=np.int64),
+            **land_of(scene),
+            **sight_of(self._fov, detection=False),
+            path=self._path,
+        )
 
     def plan(
         self,
@@ -58,14 +70,13 @@ class GreedyPlanner:
     ) -> Decision:
         """Where to go next: see `Planner.plan`. Draws nothing; its value is a probability."""
         began = time.perf_counter()
-        scene: Scene = self._world.scene(belief, state.cell)
+        scene = self._world.scene(belief, state.cell)
+        if scene is not self._scene:
+            self._enter(scene)
         cols = scene.ground.shape[1]
-        value, length = follow_horizon(
-            state.cell[0] * cols + state.cell[1], heading_index(state.heading), self._horizon, belief.weights,
-            scene.part.legal, cols, self._fov.offsets, self._gains, self._fov.is_point, self._window,
-            self._queue, self._path,
-        )  # fmt: skip
-        unreachable = scene.unreachable(belief, belief.sums_of(scene.forest))
+        at, heading = state.cell[0] * cols + state.cell[1], heading_index(state.heading)
+        value, length = follow_horizon(at, heading, belief.weights, self._parcel.address)
+        unreachable = scene.unreachable(belief, belief.follow(scene.forest))
         if length == 0:
             return any_move(scene, state, began, unreachable)
         effort = Effort(0, time.perf_counter() - began)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,8 +11,9 @@ from numpy.typing import ArrayLike
 from roisearch.belief import Belief
 from roisearch.decision import AHEAD, Decision, Effort, SearchState
 from roisearch.fov import FieldOfView, heading_index
-from roisearch.kernels.onestep import follow_index
+from roisearch.kernels.onestep import INDEX, follow_index
 from roisearch.planners.base import Progress, Scene, World, any_move, cells_of, remark_on
+from roisearch.planners.packing import forest_of, land_of, ranging_of, sight_of
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions
 
@@ -48,31 +50,27 @@ class IndexPlanner:
         """Make room for everything that depends on the map."""
         self._scene = scene
         rows, cols = scene.ground.shape
-        cells, is_open, fov, forest = rows * cols, scene.ground.is_open, self._fov, scene.forest
-        worth = np.ones(8 + (rows + cols if is_open else cells))
-        worth[1:] = np.arange(1, worth.size, dtype=np.float64) ** (-1.0 / self._alpha)
+        fields = 0 if scene.ground.is_open else 1
         self._path = np.zeros((2, AHEAD), dtype=np.int64)
         self._scores = np.zeros(scene.regions)
-        self._arrays = (
-            forest.cell_of,
-            forest.first,
-            forest.last,
-            forest.box,
-            forest.root[: scene.regions],
-            scene.part.legal,
-            cols,
-            fov.offsets,
-            fov.p_tp,
-            fov.is_point,
-            fov.reach,
-            worth,
-            np.zeros(0 if is_open else cells, dtype=np.int32),  # forward
-            np.zeros((0 if is_open else 1, cells), dtype=np.int32),  # field
-            np.zeros(0 if is_open else cells, dtype=np.int64),  # queue
-            np.zeros(144, dtype=np.int64),  # stack
-            self._scores,
-            self._path,
+        self._parcel = INDEX.pack(
+            **forest_of(scene, scene.forest.root[: scene.regions]),
+            **land_of(scene),
+            **sight_of(self._fov, detection=True),
+            **ranging_of(scene, self._fov, self._alpha),
+            field=np.zeros((fields, rows * cols), dtype=np.int32),
+            scores=self._scores,
+            path=self._path,
         )
+
+    def redraw(self, regions: Regions) -> Callable[[], None]:
+        """Reckon with other regions: see `Redrawable`."""
+        other = self._world.redrawn(regions)
+
+        def take() -> None:
+            self._world, self._scene = other, None
+
+        return take
 
     def plan(
         self,
@@ -87,17 +85,20 @@ class IndexPlanner:
         scene = self._world.scene(belief, state.cell)
         if scene is not self._scene:
             self._enter(scene)
-        sums = belief.sums_of(scene.forest)
+        sums = belief.follow(scene.forest)
         cols = scene.ground.shape[1]
         at = state.cell[0] * cols + state.cell[1]
         heading = heading_index(state.heading)
-        region, goal, length = follow_index(at, heading, belief.weights, sums.peaks, *self._arrays)
+        region, goal, length = follow_index(at, heading, belief.weights, sums.peaks, self._parcel.address)
         unreachable = scene.unreachable(belief, sums)
         if region < 0:
             return any_move(scene, state, began, unreachable)
         scores = (self._scores / belief.total) ** self._alpha
         options = np.zeros((4 + scene.regions, 2))
         options[:4, 0] = -1.0  # single moves are not among its options
+        options[4:, 0] = np.where(
+            scene.forest.root[: scene.regions] >= 0, 0.0, -1.0
+        )  # none to a region without cells
         options[4:, 1] = scores
         return Decision(
             cells_of(self._path, length),

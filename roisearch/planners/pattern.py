@@ -79,7 +79,7 @@ class PatternPlanner:
             self._enter(scene, belief)
         cols = scene.ground.shape[1]
         at = state.cell[0] * cols + state.cell[1]
-        sums = belief.sums_of(scene.forest)
+        sums = belief.follow(scene.forest)
         unreachable = scene.unreachable(belief, sums)
         likely = scene.likeliest(belief, sums)
         if likely >= 0 and belief.weights[likely] > self._attend * belief.total:
@@ -171,7 +171,7 @@ class SpiralPlanner(PatternPlanner):
 
     def _pattern(self, scene: Scene, belief: Belief) -> NDArray[np.int64]:
         cols = scene.ground.shape[1]
-        centre = scene.likeliest(belief, belief.sums_of(scene.forest))
+        centre = scene.likeliest(belief, belief.follow(scene.forest))
         cells: NDArray[np.int64] = np.flatnonzero((scene.part.legal > 0) & (belief.weights > 0.0))
         if centre < 0 or cells.size == 0:
             return cells

@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 from roisearch.belief import Belief
 from roisearch.decision import Decision, Effort, SearchState
 from roisearch.fov import FieldOfView, heading_index
-from roisearch.kernels.policies import search_policies
+from roisearch.kernels.handover import Parcel
+from roisearch.kernels.policies import WALKS, search_policies
 from roisearch.planners.base import Progress, Scene, World, cells_of, remark_on
+from roisearch.planners.packing import fading_of, land_of, sight_of
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions
 
@@ -55,9 +57,20 @@ class DirectPolicySearch:
         self._epsilon, self._horizon, self._rollouts, self._fades = epsilon, horizon, rollouts, fades
         self._scene: Scene | None = None
         self._random = np.zeros(1, dtype=np.uint64)
-        self._log = np.zeros(horizon * len(fov.p_tp), dtype=np.int64)
-        self._gains, self._miss = np.ones(len(fov.p_tp)), 1.0 - fov.p_tp
-        self._trial, self._path, self._best = (np.zeros((2, horizon), dtype=np.int64) for _ in range(3))
+        self._path, self._best = (np.zeros((2, horizon), dtype=np.int64) for _ in range(2))
+
+    def _pack(self, scene: Scene, cells: int) -> Parcel:
+        """What the kernel needs of the map and of the settings."""
+        return WALKS.pack(
+            horizon=self._horizon,
+            epsilon=self._epsilon,
+            random=self._random,
+            **land_of(scene),
+            **sight_of(self._fov, detection=False),
+            **fading_of(self._fov, cells, self._fades, self._horizon),
+            trial=np.zeros((2, self._horizon), dtype=np.int64),
+            path=self._path,
+        )
 
     def plan(
         self,
@@ -73,17 +86,13 @@ class DirectPolicySearch:
         rows, cols = scene.ground.shape
         if scene is not self._scene:
             self._scene = scene
-            self._fade = np.ones(rows * cols if self._fades else 1)
+            self._parcel = self._pack(scene, rows * cols)
         self._random[0] = rng.bit_generator.random_raw()
         at, heading = state.cell[0] * cols + state.cell[1], heading_index(state.heading)
         done, best = 0, -1.0
         while done < self._rollouts:
             chunk = self._rollouts - done if deadline_s is None else min(_CHUNK, self._rollouts - done)
-            value = search_policies(
-                at, heading, chunk, self._horizon, self._epsilon, self._random, belief.weights, self._fade,
-                self._fades, self._log, scene.part.legal, cols, self._fov.offsets, self._gains, self._miss,
-                self._fov.is_point, self._trial, self._path,
-            )  # fmt: skip
+            value = search_policies(at, heading, chunk, belief.weights, self._parcel.address)
             done += chunk
             if value > best:
                 best = value
@@ -91,7 +100,7 @@ class DirectPolicySearch:
             if deadline_s is not None and time.perf_counter() - began >= deadline_s:
                 break
         path = cells_of(self._best, self._horizon)
-        unreachable = scene.unreachable(belief, belief.sums_of(scene.forest))
+        unreachable = scene.unreachable(belief, belief.follow(scene.forest))
         effort = Effort(done, time.perf_counter() - began)
         return Decision(path, "walk", best / belief.total, effort, unreachable, remark_on(unreachable))
 

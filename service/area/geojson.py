@@ -17,13 +17,29 @@ from numpy.typing import NDArray
 
 from service.errors import BadInput
 
-WGS84_NAMES = frozenset({"crs84", "urn:ogc:def:crs:ogc::crs84", "urn:ogc:def:crs:ogc:1.3:crs84"}) | frozenset(
-    {"ogc:crs84", "epsg:4326", "urn:ogc:def:crs:epsg::4326", "http://www.opengis.net/def/crs/ogc/1.3/crs84"}
-)
+WGS84_CODES = frozenset({"crs84", "crs84h", "4326", "4979"})
 """What a GeoJSON 2008 'crs' member may say; RFC 7946 removed it, QGIS and GDAL still write it."""
+NEAR_CODES = {
+    "4258": "ETRS89",
+    "4269": "NAD83",
+    "4617": "NAD83(CSRS)",
+    "6318": "NAD83(2011)",
+    "4283": "GDA94",
+    "7844": "GDA2020",
+    "6668": "JGD2011",
+    "4619": "SWEREF99",
+    "4171": "RGF93",
+    "4674": "SIRGAS 2000",
+}
+"""Degrees that differ from WGS84 by less than two metres, which is less than a position is known by."""
+_CRS = re.compile(r"(?:.*[:/])?(?:ogc|epsg)[:/]+(?:[\d.]*[:/]+)?(\w+)|(crs84)", re.IGNORECASE)
+
+MOST_BYTES = 32 << 20
+"""Of an area file, unpacked: a hundred times what outlines need."""
+MOST_POSITIONS = 200_000
+"""In one file: what a computer drew is simplified by whoever drew it, and not while an aircraft waits."""
 
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
-_UTF16_OR_32 = (b"\xff\xfe", b"\xfe\xff", b"\x00\x00\xfe\xff")
 _REPROJECT = "export it again in WGS84 (EPSG:4326)"
 
 
@@ -37,7 +53,7 @@ class Where:
     def bad(self, problem: str) -> BadInput:
         """The error that says: file, feature, problem (which contains the fix)."""
         where = f"{self.source}: {self.part}" if self.part else self.source
-        return BadInput(f"{where}: {problem}.")
+        return BadInput(f"{where}: {problem}" + ("" if problem.endswith("?") else "."))
 
 
 def quote(value: object) -> str:
@@ -50,36 +66,43 @@ def read_bytes(path: str | Path) -> bytes:
     """The content of a file.
 
     Raises:
-        BadInput: the file is missing, is a folder, or may not be read.
+        BadInput: the file is missing, is a folder, may not be read, or is larger than any area.
     """
     try:
-        return Path(path).read_bytes()
+        with Path(path).open("rb") as stream:
+            data = stream.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise BadInput(
+                f"{path}: it has more than {MOST_BYTES >> 20} MB; export only the area and what belongs to it."
+            )
+        return data
+    except BadInput:
+        raise
     except FileNotFoundError:
         raise BadInput(f"{path}: there is no such file; check the path.") from None
     except IsADirectoryError:
-        raise BadInput(f"{path}: this is a folder; give the GeoJSON file in it.") from None
+        raise BadInput(f"{path}: this is a folder; give the area file in it.") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise BadInput(f"{path}: cannot be read ({reason}); check the file and its permissions.") from None
 
 
-def load_json(data: bytes, where: Where) -> dict[str, Any]:
-    """The JSON object in `data`: UTF-8, with or without a byte order mark (RFC 8259, section 8.1).
+def load_json(text: str, where: Where) -> Any:
+    """The JSON value in a text.
 
     Raises:
-        BadInput: not UTF-8, not JSON, or not an object.
+        BadInput: not JSON, or with a text that cannot be written again.
     """
-    if data.startswith(_UTF16_OR_32):
-        raise where.bad("the file is UTF-16 or UTF-32; save it as UTF-8")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise where.bad(f"byte {error.start} is not UTF-8; save the file as UTF-8") from None
     if not text.strip():
         raise where.bad("the file is empty; draw an area and save it as GeoJSON")
     try:
         value = json.loads(text)
     except json.JSONDecodeError as error:
+        if (error.lineno, error.colno) == (1, 1) and text[:1] not in "{[":
+            start = quote(text[:20].split("\n")[0])
+            raise where.bad(
+                f"it begins with {start} and is neither GeoJSON nor KML nor GPX; export it as one of these"
+            ) from None
         at = f"line {error.lineno}, column {error.colno}"
         raise where.bad(
             f"not JSON at {at} ({error.msg}); correct it there or export the file again"
@@ -88,10 +111,6 @@ def load_json(data: bytes, where: Where) -> dict[str, Any]:
         raise where.bad("not usable JSON (a number too long or too many levels); export it again") from None
     if _SURROGATE.search(text) and not _is_whole(value):
         raise where.bad("a text holds half of a character (\\ud800 to \\udfff); export the file again")
-    if not isinstance(value, dict):
-        raise where.bad(
-            "not GeoJSON: the top level must be an object with a 'type', such as FeatureCollection"
-        )
     return value
 
 
@@ -104,20 +123,25 @@ def _is_whole(value: object) -> bool:
     return True
 
 
-def check_crs(item: dict[str, Any], where: Where) -> None:
-    """Refuse a 'crs' member that names anything but WGS84 (RFC 7946, section 4).
+def check_crs(item: dict[str, Any], where: Where) -> str | None:
+    """Refuse a 'crs' member that names anything but WGS84 (RFC 7946, section 4); a note where it is not quite that.
 
     Raises:
         BadInput: another coordinate reference system.
     """
     crs = item.get("crs")
     if crs is None:
-        return
+        return None
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
-    if not isinstance(name, str) or name.strip().lower() not in WGS84_NAMES:
+    found = _CRS.fullmatch(name.strip()[:200]) if isinstance(name, str) else None
+    code = (found.group(1) or found.group(2)).lower() if found else ""
+    if code in NEAR_CODES:
+        return f"its degrees are {NEAR_CODES[code]}, taken as WGS84, from which they differ by less than two metres"
+    if code not in WGS84_CODES:
         shown = name if name is not None else crs
         raise where.bad(f"'crs' is {quote(shown)}, but an area file is in WGS84; {_REPROJECT}")
+    return None
 
 
 def number(value: object) -> float | None:
@@ -202,6 +226,30 @@ def _ring(value: object, index: int, where: Where) -> NDArray[np.float64]:
         near = quote(points[jumps[0]].tolist())
         raise where.bad(f"{name} crosses the antimeridian after {near}; search one side of it at a time")
     return points
+
+
+def line(geometry: dict[str, Any], where: Where) -> shapely.MultiLineString:
+    """A GeoJSON LineString or MultiLineString as one shapely MultiLineString (RFC 7946, sections 3.1.4 and 3.1.5).
+
+    Raises:
+        BadInput: no positions, no length, or across the antimeridian.
+    """
+    coordinates = geometry.get("coordinates")
+    lines = coordinates if geometry["type"] == "MultiLineString" else [coordinates]
+    if not isinstance(lines, list) or not lines:
+        raise where.bad("the line is empty; draw it again")
+    parts = []
+    for each in lines:
+        if not isinstance(each, list) or len(each) < 2:
+            raise where.bad("a line needs a list of at least two positions; draw it again")
+        points = np.array([position(item, where) for item in each])
+        if (np.abs(np.diff(points[:, 0])) > 180).any():
+            raise where.bad("the line crosses the antimeridian; draw it on one side")
+        parts.append(points)
+    shape = shapely.MultiLineString(parts)
+    if shape.length == 0:
+        raise where.bad("the line has no length; draw it again")
+    return shape
 
 
 def multipolygon(geometry: dict[str, Any], where: Where) -> shapely.MultiPolygon:

@@ -22,6 +22,9 @@ _MAX_CUT = 64
 POA_BAND = "POA"
 """Of several bands the one described by this is taken, as in the export of a run."""
 
+_UNITS = ("", "1", "%", "percent", "probability", "unity")
+"""Units of a band of probabilities; their size does not matter, as they are relative to each other."""
+
 _CHUNK = 2_000_000
 """Samples located at once, to bound the memory."""
 
@@ -34,7 +37,8 @@ def read_geotiff_prior(
     A pixel's value is the relative probability that the target is in that pixel. Each pixel
     is cut into equal samples that are shared out to the cells they lie in, so no mass is lost
     or made up by interpolation, whatever the two resolutions and the raster's CRS. Nodata and NaN count
-    as zero. What lies off the grid, or on the uncovered part of a cell, is left out.
+    as zero, and the band's scale and offset are applied. What lies off the grid, or on the uncovered part of a cell,
+    is left out.
 
     Args:
         path: a GeoTIFF in any CRS, of one band or with one that is described as POA.
@@ -80,6 +84,7 @@ def _read(raster: Any, frame: GridFrame, where: Where) -> FloatArray:
         raise where.bad(
             f"the raster has {raster.count} bands; give one band of probabilities, or call that band {POA_BAND}"
         )
+    _refuse_other_meanings(raster, where)
     try:
         to_raster = pyproj.Transformer.from_crs("EPSG:4326", raster.crs.to_wkt(), always_xy=True)
     except pyproj.exceptions.ProjError:
@@ -100,13 +105,36 @@ def _read(raster: Any, frame: GridFrame, where: Where) -> FloatArray:
     return mass
 
 
+def _band(raster: Any) -> int:
+    """The number of the band that holds the probabilities."""
+    return 1 if raster.count == 1 else int(raster.descriptions.index(POA_BAND)) + 1
+
+
+def _refuse_other_meanings(raster: Any, where: Where) -> None:
+    """A band of colours, of metres or of decibels would be laid out like probabilities, and mean nothing."""
+    number = _band(raster)
+    if raster.colorinterp[number - 1].name == "palette":
+        raise where.bad(
+            "the raster's numbers are those of a palette's colours; give the probabilities themselves"
+        )
+    unit = (raster.units[number - 1] or "").strip()
+    if unit.lower() not in _UNITS:
+        raise where.bad(f"the raster's unit is '{unit}'; give probabilities, without a unit or in percent")
+    scale, offset = raster.scales[number - 1], raster.offsets[number - 1]
+    if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
+        raise where.bad(
+            f"the raster's scale is {scale:g} and its offset {offset:g}; give probabilities as they are"
+        )
+
+
 def _values(raster: Any, window: Any, where: Where) -> FloatArray:
     """The pixels of a window, nodata and NaN as zero; anything else that is no probability is refused."""
-    number = 1 if raster.count == 1 else raster.descriptions.index(POA_BAND) + 1
+    number = _band(raster)
     band = raster.read(number, window=window, masked=True)
     if np.iscomplexobj(band):
         raise where.bad("the raster holds complex numbers; give probabilities")
-    values = np.asarray(band.astype(np.float64).filled(0.0))
+    told = band.astype(np.float64) * raster.scales[number - 1] + raster.offsets[number - 1]
+    values = np.asarray(told.filled(0.0))
     values[np.isnan(values)] = 0.0
     wrong = np.argwhere((values < 0) | np.isinf(values))
     if wrong.size:

@@ -1,28 +1,37 @@
 """The grid that the search runs on: prior, searchable and flyable cells, launch point."""
 
+import functools
 import math
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from service.area import route
+from service.area.checks import check_launch
 from service.area.frame import BoolArray, GridFrame, lay_frame
 from service.area.geojson import Where
-from service.area.model import LatLon, SearchArea
+from service.area.model import SearchArea, Target
 from service.area.prior import area_prior, cell_squares, covered_fraction
 from service.area.projection import FloatArray, surface_m2
-from service.area.reading import check_launch
 from service.area.route import KeepOut
 from service.errors import BadInput
+from service.geometry import LatLon
+from service.ground.relief import Relief
+
+if TYPE_CHECKING:
+    from roisearch import Walk
 
 Array = TypeVar("Array", FloatArray, BoolArray)
 
 CLEARANCE_M = 5.0
 """How far the aircraft keeps from an exclusion, in metres: position error and overshoot at a waypoint."""
+
+NEEDS_A_TEAM = 0.2
+"""Ground on which less than this part of a target's chance in the open is left is not searched from above."""
 
 _SLIVER = 1e-6
 """Less than this part of a cell is rounding, not ground."""
@@ -45,8 +54,12 @@ class Grid:
         launch: (latitude, longitude) where the search starts and ends.
         start: the flyable cell (row, col) nearest to the launch point.
         keep_out: the exclusions on the plane, for `leg_is_clear` and `way_home`.
-        outline: the area as drawn, on the plane.
+        clearance_m: how far legs keep from them, in metres.
+        outline: the area as drawn, and what may be crossed between its parts, on the plane.
         layout_notes: what the operator should know about the layout; see `notes`.
+        relief: the heights of the ground; None: it is taken as flat.
+        target: how the target moves; None: it stands still.
+        visibility: float [rows, cols], what a look from above finds there as a share of that in the open; None: all.
     """
 
     frame: GridFrame
@@ -60,6 +73,20 @@ class Grid:
     keep_out: KeepOut
     outline: shapely.Geometry
     layout_notes: tuple[str, ...]
+    clearance_m: float = CLEARANCE_M
+    relief: Relief | None = None
+    visibility: FloatArray | None = None
+    target: Target | None = None
+
+    @property
+    def walk(self) -> "Walk | None":
+        """How the target walks from cell to cell; None: it stands still.
+
+        Made when it is asked for: who does not search, such as the process at the door, needs no compiler.
+        """
+        from roisearch import Walk
+
+        return None if self.target is None else Walk(cell_m=self.frame.cell_m, **asdict(self.target))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -68,8 +95,80 @@ class Grid:
 
     @property
     def reachable_mass(self) -> float:
-        """The share of the prior in flyable cells: what a footprint of one cell can ever find."""
-        return float(self.prior[self.flyable].sum())
+        """The share of the prior in flyable cells that can be seen: what a footprint of one cell can ever find."""
+        seen = self.flyable if self.visibility is None else self.flyable & (self.visibility >= NEEDS_A_TEAM)
+        return float(self.prior[seen].sum())
+
+    @functools.cached_property
+    def _flyable_cells(self) -> NDArray[np.int64]:
+        return np.argwhere(self.flyable)
+
+    def nearest_flyable(self, cell: tuple[int, int]) -> tuple[int, int]:
+        """The flyable cell nearest to `cell` along the grid, itself if it is flyable."""
+        away = np.abs(self._flyable_cells - np.array(cell)).sum(axis=1)
+        row, col = self._flyable_cells[away.argmin()]
+        return int(row), int(col)
+
+    def over(self, relief: Relief, clear: BoolArray, why: str) -> "Grid":
+        """The same grid over ground with heights, where only cells that are `clear`, bool [rows, cols], are flown.
+
+        Of several separate parts only one stays: the one with the most prior mass. `why` others are not flown ends a
+        note.
+
+        Raises:
+            BadInput: no cell stays.
+        """
+        labels, count = ndimage.label(self.flyable & clear)
+        if not count:
+            raise BadInput(f"no cell of the area can be flown: {why}")
+        parts = np.arange(1, count + 1)
+        mass, size = (
+            ndimage.sum_labels(self.prior, labels, parts),
+            ndimage.sum_labels(labels > 0, labels, parts),
+        )
+        flyable = labels == np.lexsort((-size, -mass))[0] + 1
+        lost = self.flyable & ~flyable
+        notes = self.layout_notes
+        if lost.any():
+            notes += (
+                f"{int(lost.sum())} cells with {100 * float(self.prior[lost].sum()):.3g} % of the prior are not flown: "
+                f"{why}.",
+            )
+        start = nearest_flyable(self.frame, flyable, self.launch)
+        return replace(self, flyable=_frozen(flyable), start=start, layout_notes=notes, relief=relief)
+
+    def under(self, visibility: FloatArray) -> "Grid":
+        """The same grid where a look finds only a part, [rows, cols], 0 to 1, of what it finds in the open."""
+        dark = float(self.prior[visibility < NEEDS_A_TEAM].sum())
+        notes = self.layout_notes
+        if dark >= 0.0005:
+            notes += (
+                f"{100 * dark:.3g} % of the prior lies under cover where a look finds less than {NEEDS_A_TEAM:.0%} of "
+                "what it finds in the open: that needs a ground team.",
+            )
+        return replace(self, visibility=_frozen(visibility), layout_notes=notes)
+
+    def excluding(self, shape: shapely.Geometry) -> "Grid":
+        """The same grid with one more exclusion (degrees, x = longitude), which keeps its mass but is not flown over.
+
+        Raises:
+            BadInput: it leaves nothing to fly over, closes the way from the launch point, or has too many corners.
+        """
+        where = Where("the exclusion")
+        flat = shapely.union(self.keep_out.core, self.frame.flatten(shape))
+        blocked = route.keep_out_of(flat, self.clearance_m)
+        allowed = self.flyable & ~shapely.intersects(blocked.zone, cell_squares(self.frame))
+        if not allowed.any():
+            raise where.bad("it leaves no cell to fly over; make it smaller")
+        flyable, _, notes = _reachable_part(self.frame, allowed, self.prior, blocked, self.launch, where)
+        start = nearest_flyable(self.frame, flyable, self.launch)
+        return replace(
+            self,
+            flyable=_frozen(flyable),
+            keep_out=blocked,
+            start=start,
+            layout_notes=self.layout_notes + notes,
+        )
 
     def with_prior(self, prior: ArrayLike) -> "Grid":
         """The same grid with another prior [rows, cols], such as one from a GeoTIFF; scaled to sum to 1.
@@ -98,8 +197,10 @@ def build_grid(
 
     A cell is searchable when it holds any ground that is searched. It is flyable when its
     centre lies in the area grown by `margin_m` and its square keeps `clearance_m` from every
-    exclusion; of several separate parts only one is flyable: the one with the most prior
-    mass that the launch point can reach. The strip of a searchable cell beside an exclusion
+    exclusion. Between separate parts of the area the aircraft crosses the ground that the file
+    draws for it (`transit`), or their convex hull, never an exclusion; of parts that are separate
+    all the same only one is flyable: the one with the most prior mass that the launch point can
+    reach. The strip of a searchable cell beside an exclusion
     stays searchable, though its cell may not be flown over: a footprint wider than a cell
     sees it, and with a footprint of one cell the belief honestly keeps its mass.
 
@@ -140,8 +241,17 @@ def build_grid(
 
     blocked = route.keep_out(frame, area.exclusions, clearance_m)
     centres = shapely.centroid(squares)
-    allowed = shapely.dwithin(frame.flatten(area.polygon), centres, margin)
-    allowed &= ~shapely.intersects(blocked.zone, squares)
+    clear = ~shapely.intersects(blocked.zone, squares)
+    outline = frame.flatten(area.polygon)
+    allowed = clear & shapely.dwithin(outline, centres, margin)
+    crossed: tuple[str, ...] = ()
+    if ndimage.label(allowed)[1] > 1 and not (transit := transit_ground(frame, area)).is_empty:
+        outline = shapely.union(outline, transit)
+        allowed = clear & shapely.dwithin(outline, centres, margin)
+        ground = "the ground drawn as transit" if area.transit is not None else "their convex hull"
+        crossed = (
+            f"Between separate parts of the area the aircraft crosses {ground}, which is not searched.",
+        )
     if not allowed.any():
         raise where.bad(f"the exclusions leave no cell of {cell_m:g} m to fly over; make them smaller")
     chosen = launch or area.launch
@@ -156,8 +266,10 @@ def build_grid(
         launch=home,
         start=nearest_flyable(frame, flyable, home),
         keep_out=blocked,
-        outline=frame.flatten(area.polygon),
-        layout_notes=notes,
+        outline=outline,
+        layout_notes=crossed + notes,
+        clearance_m=clearance_m,
+        target=area.target,
     )
 
 
@@ -186,6 +298,17 @@ def way_home(grid: Grid, start: LatLon, end: LatLon) -> list[LatLon]:
         BadInput: an exclusion closes every way.
     """
     return route.way(grid.frame, grid.keep_out, start, end)
+
+
+def transit_ground(frame: GridFrame, area: SearchArea) -> shapely.Geometry:
+    """What may be crossed between the parts of an area, on the plane: as drawn, or their convex hull.
+
+    A single polygon has no such ground unless it is drawn: what an exclusion cuts it into is not joined around it.
+    """
+    if area.transit is not None:
+        return frame.flatten(area.transit)
+    several = len(area.polygon.geoms) > 1
+    return shapely.convex_hull(frame.flatten(area.polygon)) if several else shapely.Polygon()
 
 
 def _check_cell(area: SearchArea, cell_m: float, where: Where) -> None:
@@ -251,7 +374,9 @@ def _prior_notes(prior: FloatArray, searchable: BoolArray, flyable: BoolArray) -
         )
     empty = int((searchable & (prior < _NO_MASS)).sum())
     if empty:
-        notes += (f"{empty} of {int(searchable.sum())} searchable cells have no prior mass.",)
+        notes += (
+            f"{empty} of {int(searchable.sum())} searchable cells have a prior of 0: no search of them.",
+        )
     return notes
 
 

@@ -1,12 +1,15 @@
-"""Prior mass per cell from the polygons and points of the area file, all integrals exact."""
+"""Prior mass per cell from the polygons, lines, points and rings of the area file, all integrals exact."""
+
+from collections.abc import Iterator
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 from scipy.special import ndtr
 
 from service.area.frame import BoolArray, GridFrame
 from service.area.geojson import Where
-from service.area.model import PointPrior, SearchArea
+from service.area.model import RING_MASS, LinePrior, PointPrior, Prior, RingPrior, SearchArea, ring_edges
 from service.area.projection import FloatArray
 
 
@@ -35,7 +38,8 @@ def area_prior(
 
     Each prior feature is first scaled to have mass 1 on the searchable ground, so that its
     weight is its share of the whole; a polygon spreads evenly over the ground it shares with
-    the area, a point as a Gaussian that is cut off at the area's edge. Without prior
+    the area, a line likewise in its strip, a point as a Gaussian that is cut off at the area's
+    edge, an initial planning point as rings of published distances. Without prior
     features the mass is even over the ground.
 
     Args:
@@ -54,21 +58,83 @@ def area_prior(
     ground = np.where(searchable, fraction, 0.0)
     if not area.priors:
         return np.asarray(ground / ground.sum())
-    flat_ground = frame.flatten(area.ground)
-    largest = max(prior.weight for prior in area.priors)
     mass: FloatArray = np.zeros(frame.shape)
+    for part in prior_parts(area, frame, squares, fraction, searchable):
+        mass += part
+    return np.asarray(mass / mass.sum())
+
+
+def prior_parts(
+    area: SearchArea, frame: GridFrame, squares: shapely.Geometry, fraction: FloatArray, searchable: BoolArray
+) -> Iterator[FloatArray]:
+    """What each prior feature of an area adds, float [rows, cols] in the file's order; arguments as `area_prior`.
+
+    Each sums to its weight over the largest of them.
+    """
+    ground = np.where(searchable, fraction, 0.0)
+    flat_ground = frame.flatten(area.ground)
+    largest = max((prior.weight for prior in area.priors), default=1.0)
     for prior in area.priors:
+        share = np.where(searchable, _share(prior, frame, squares, flat_ground), 0.0)
         if isinstance(prior, PointPrior):
-            share = gaussian(frame, prior) * ground
-        else:
-            inside = shapely.intersection(frame.flatten(prior.polygon), flat_ground)
-            share = np.where(searchable, covered_fraction(squares, inside), 0.0)
+            share = share * ground
         total = share.sum()
         if not total > 0:
             where = Where(area.source, prior.label)
             raise where.bad("the prior has no mass on any cell that is searched; move it or widen it")
-        mass += prior.weight / largest * (share / total)
-    return np.asarray(mass / mass.sum())
+        yield prior.weight / largest * (share / total)
+
+
+def _share(
+    prior: Prior, frame: GridFrame, squares: shapely.Geometry, flat_ground: shapely.Geometry
+) -> FloatArray:
+    """One prior on the cells, [rows, cols], of any sum."""
+    if isinstance(prior, PointPrior):
+        return gaussian(frame, prior)
+    if isinstance(prior, LinePrior):
+        inside = shapely.buffer(frame.flatten(prior.line), prior.width_m / 2)
+    elif isinstance(prior, RingPrior):
+        east, south = frame.to_metres([prior.position])[0]
+        return ring_mass(prior, (float(east), float(south)), squares, flat_ground)
+    else:
+        inside = frame.flatten(prior.polygon)
+    return covered_fraction(squares, shapely.intersection(inside, flat_ground))
+
+
+def ring_mass(
+    prior: RingPrior, centre: tuple[float, float], squares: shapely.Geometry, ground: shapely.Geometry
+) -> FloatArray:
+    """The probability that a ring prior gives to the ground in each square, [rows, cols]: exact, since within a ring
+    it is even by surface. It sums to what lies in the ground.
+
+    Args:
+        prior: the rings.
+        centre: where they are centred, in the metres of `squares` and `ground`.
+        squares, ground: flat geometries; the squares are [rows, cols].
+    """
+    point = shapely.Point(centre)
+    surface = shapely.area(squares)
+    mass = np.zeros(np.shape(squares))
+    inner = np.zeros(np.shape(squares))
+    inner_area = 0.0
+    for radius, share in zip(ring_edges(prior), RING_MASS, strict=True):
+        disc = shapely.buffer(point, radius, quad_segs=64)
+        within = covered_fraction(squares, shapely.intersection(disc, ground)) * surface
+        mass += share * (within - inner) / (disc.area - inner_area)
+        inner, inner_area = within, disc.area
+    return np.maximum(mass, 0.0)
+
+
+def rings_inside(prior: RingPrior, centre: ArrayLike, ground: shapely.Geometry) -> float:
+    """How much of the distances of a ring prior lies in flat ground, 0 to 1."""
+    point = shapely.Point(np.asarray(centre))
+    inside, inner, inner_area = 0.0, 0.0, 0.0
+    for radius, share in zip(ring_edges(prior), RING_MASS, strict=True):
+        disc = shapely.buffer(point, radius, quad_segs=64)
+        within = shapely.intersection(disc, ground).area
+        inside += share * (within - inner) / (disc.area - inner_area)
+        inner, inner_area = within, disc.area
+    return float(min(max(inside, 0.0), 1.0))
 
 
 _POINT = 1e-9

@@ -14,9 +14,10 @@ import numpy as np
 import shapely
 
 from service.area.frame import BoolArray, GridFrame
-from service.area.model import Exclusion, LatLon
+from service.area.model import Exclusion
 from service.area.projection import FloatArray
 from service.errors import BadInput
+from service.geometry import LatLon
 
 _SPARE_M = 0.5
 """Leaving the zone by the nearest way ends this far outside it."""
@@ -27,6 +28,12 @@ _ABOUT = 1.5
 _TOLERANCES_M = (0.5, 1.0, 2.0, 4.0, 8.0)
 _MAX_CORNERS = 250
 """The outline of exclusions is simplified by these tolerances in turn until it has this many corners."""
+
+_MOST_CORNERS = 500
+"""With more, even simplified as far as that, a way home takes longer to find than an aircraft should wait for it."""
+
+_MOST_DRAWN = 2000
+"""Corners of the zone itself; one that has more is simplified, outwards, by what the aircraft keeps clear of anyway."""
 
 
 @dataclass(frozen=True)
@@ -60,15 +67,33 @@ class KeepOut:
 
 
 def keep_out(frame: GridFrame, exclusions: Sequence[Exclusion], clearance_m: float) -> KeepOut:
-    """The exclusions grown by `clearance_m` metres, ready for `leg_is_clear` and `way_home`."""
-    flat = shapely.union_all([frame.flatten(item.polygon) for item in exclusions])
+    """The exclusions grown by `clearance_m` metres, ready for `leg_is_clear` and `way_home`.
+
+    Raises:
+        BadInput: they have more corners, simplified, than a route can be found around in time.
+    """
+    return keep_out_of(shapely.union_all([frame.flatten(item.polygon) for item in exclusions]), clearance_m)
+
+
+def keep_out_of(flat: shapely.Geometry, clearance_m: float) -> KeepOut:
+    """The same for exclusions on the plane. Raises BadInput as `keep_out`."""
+    drawn = shapely.get_num_coordinates(flat)
     zone = shapely.buffer(flat, clearance_m)
+    if shapely.get_num_coordinates(zone) > _MOST_DRAWN:  # as drawn by a river's bank or a computer
+        spare = clearance_m / 2
+        flat = shapely.simplify(shapely.buffer(flat, spare), spare)  # never inside of what was drawn
+        zone = shapely.buffer(flat, clearance_m)
     for tolerance in _TOLERANCES_M:
         # A mitred outline grown by 2 x tolerance and then simplified by 1 x stays outside the zone.
         grown = shapely.buffer(flat, clearance_m + 2 * tolerance, join_style="mitre", mitre_limit=2.0)
         corners = shapely.get_coordinates(shapely.simplify(grown, tolerance))
         if len(corners) <= _MAX_CORNERS:
             break
+    if len(corners) > _MOST_CORNERS:
+        raise BadInput(
+            f"the exclusions have {drawn} corners, and {len(corners)} when drawn to {_TOLERANCES_M[-1]:g} m; "
+            f"a way around more than {_MOST_CORNERS} is not found in time, so draw fewer or simpler ones"
+        )
     shapely.prepare(zone)
     corners = np.unique(corners, axis=0)
     outside = ~shapely.intersects_xy(zone, corners[:, 0], corners[:, 1])

@@ -9,7 +9,7 @@ from service.camera.ground import Flat, Ground
 from service.camera.locate import Errors, Spot, locate_pixel, spread
 from service.camera.look import Looks, look_at_cells
 from service.camera.optics import Pinhole, Sight, rotation, sight_from
-from service.camera.terrain import Terrain, read_terrain
+from service.camera.terrain import Terrain, terrain_of
 
 __all__ = [
     "Detectability",
@@ -23,8 +23,8 @@ __all__ = [
     "Terrain",
     "locate_pixel",
     "look_at_cells",
-    "read_terrain",
     "rotation",
     "sight_from",
     "spread",
+    "terrain_of",
 ]

@@ -16,8 +16,8 @@ from scipy.special import ndtri
 
 from service.camera.ground import Ground
 from service.camera.optics import Floats, Sight, rotation
+from service.geometry import Cell
 
-Cell = tuple[int, int]
 _POINTS = 233  # of a Fibonacci lattice, which fills the square evenly in both directions at once
 _LATTICE = np.stack([np.arange(_POINTS), np.arange(_POINTS) * 144 % _POINTS], axis=1)
 _CLOUD = ndtri((_LATTICE + 0.5) / _POINTS)
@@ -112,6 +112,10 @@ def spread_hits(
     likelihood ratio L = p_tp / (1 - p_tn) unless it has one of its own. Several detections that share no cell are
     exact too; of those that do, one at least is a hit of the cell with 1 - prod(1 - s_c), and L is their mean.
 
+    The exception: the cell that a detection points at is never less likely for it than a hit there would make it. In
+    a frame of very many cells a single detection of no known place is fewer than the false alarms to be expected, and
+    Bayes' rule would have all of them less likely, that one too; nobody who reports a target is to be heard like that.
+
     Args:
         found: where each detection is, and its likelihood ratio, None for the cell's.
         cells, p_tp, p_tn: int [k, 2], float [k]: the cells that count as looked at.
@@ -123,15 +127,26 @@ def spread_hits(
     on_it = []
     for number, (spot, ratio) in enumerate(found):
         share, inside = shares(spread(spot, cell_m), cells, p_tn)
-        if inside >= _LEAST_INSIDE:
+        if inside >= _LEAST_INSIDE or len(_own(spot, cells, cell_m)):
             on_it.append(number)
             none *= 1.0 - share
             weight += share
             worth += share * (p_tp / (1.0 - p_tn) if ratio is None else ratio)
     one = 1.0 - none
     total = one * worth / np.maximum(weight, 1e-300) + (1.0 - one) * (1.0 - p_tp) / p_tn
+    for number in on_it:
+        spot, ratio = found[number]
+        own = _own(spot, cells, cell_m)
+        least = p_tp[own] / (1.0 - p_tn[own]) if ratio is None else ratio
+        total[own] = np.maximum(total[own], np.minimum(1.0, least))
+        weight[own] = np.maximum(weight[own], 1e-300)
     hit = np.flatnonzero(weight > 0.0)
     return {(int(cells[i, 0]), int(cells[i, 1])): float(total[i]) for i in hit}, on_it
+
+
+def _own(spot: Spot, cells: NDArray[np.int64], cell_m: float) -> NDArray[np.int64]:
+    """Which of the cells [k, 2] holds the middle of the spot: int [1], or [0] when none does."""
+    return np.flatnonzero((cells == np.floor(spot.point[::-1] / cell_m)).all(axis=1))
 
 
 def shares(

@@ -18,14 +18,19 @@ from roisearch import FieldOfView
 from service.area.frame import GridFrame
 from service.camera.detect import Detectability
 from service.camera.ground import Flat, Ground
+from service.camera.in_view import behind_box, beside_image, beside_outline
 from service.camera.locate import Errors, Spot, locate_pixel, spread_hits
 from service.camera.look import Looks, look_at_cells
 from service.camera.optics import Floats, Pinhole, Sight, rotation, sight_from
 from service.evidence.calibration import Calibration
-from service.evidence.observe import Footprint, Pose, Reading, Sighting, Unreadable
+from service.evidence.observe import Footprint, FramePose, Reading, Sighting, Unreadable
+from service.evidence.plausible import SIGMAS, check_box, check_place
 from service.evidence.reports import Detection, Gimbal, Intrinsics, Report
+from service.evidence.targets import not_the_target, only_targets
 
 _FAR_CORNER = 10.0  # times the range: so far from the camera may a corner of an outline be
+_NO_HEADING = "where the nose pointed is not known, and the camera turns with it"
+_NOTHING = Footprint(np.empty((0, 2), dtype=np.int64), *np.empty((2, 0)), *np.empty((2, 0)))
 
 
 @dataclass(frozen=True)
@@ -54,35 +59,56 @@ class CameraSensor:
     min_grazing_deg: float
     errors: Errors
     calibration: Calibration | None = None
+    classes: frozenset[str] = frozenset()
 
     # ---- the two questions of every profile --------------------------------------------------------------
 
-    def footprint(self, pose: Pose) -> Footprint:
+    def footprint(self, pose: FramePose) -> Footprint:
         """The cells that a frame taken from `pose` shows, as the settings have the camera."""
+        if not math.isfinite(pose.heading_deg):
+            return _NOTHING.in_vain(_NO_HEADING)
         return self._footprint(self.sight(pose))
 
-    def read(self, pose: Pose, report: Report) -> Reading:
+    def read(self, pose: FramePose, report: Report) -> Reading:
         """The evidence in a report of a frame taken from `pose`.
 
         Raises:
-            Unreadable: the report says what no camera of this kind can see.
+            Unreadable: the report says what no camera of this kind can see, or what its frame cannot show.
         """
-        sight = self.sight(pose, report.gimbal, report.intrinsics)
-        outline = report.footprint
+        report, ignored = only_targets(report, self.classes)
+        note = not_the_target(ignored, self.classes) if ignored else ""
+        outline, gimbal = report.footprint, report.gimbal
+        if not math.isfinite(pose.heading_deg):
+            if outline is not None and all(seen.box is None for seen in report.detections):
+                pose = replace(pose, heading_deg=0.0)  # the outline tells where it looked
+            elif gimbal is None or gimbal.relative_to == "vehicle":
+                return Reading(_NOTHING.in_vain(_NO_HEADING), {}, note=note)
+        sight = self.sight(pose, gimbal, report.intrinsics)
         footprint = self._footprint(sight) if outline is None else self._outlined(outline, sight.position[:2])
-        if self.calibration is not None and (looks := self.calibration.at(report.threshold)) is not None:
+        if (
+            self.calibration is not None
+            and (looks := self.calibration.at(report.threshold_share)) is not None
+        ):
             better, worse = looks[0] / self.detect.p_tp, (1.0 - looks[1]) / (1.0 - self.p_tn)
             p_tp, p_tn = footprint.p_tp * better, 1.0 - (1.0 - footprint.p_tn) * worse
             footprint = replace(footprint, p_tp=p_tp, p_tn=p_tn)
-        spots = [(spot, seen) for seen in report.detections if (spot := self._spot(sight, seen)) is not None]
-        looked = footprint.counts
+        spots = []
+        for seen in self._checked(report, sight):
+            spot = self.spot(sight, seen)
+            if spot is not None:
+                spots.append((spot, seen))
+            elif seen.box is not None:
+                footprint = self._less_what_is_behind(footprint, sight, seen.box)
+        looked, worth = footprint.counts, self.calibration
         hits, on_it = spread_hits(
-            [(spot, self.calibration.ratio(seen.score) if self.calibration else None) for spot, seen in spots],
+            [(spot, worth.ratio(report.share(seen.score)) if worth else None) for spot, seen in spots],
             footprint.cells[looked], footprint.p_tp[looked], footprint.p_tn[looked], self.frame.cell_m,
         )  # fmt: skip
-        return Reading(footprint, hits, tuple(self._sighting(*spots[i]) for i in on_it))
+        return Reading(footprint, hits, tuple(self._sighting(*spots[i], report) for i in on_it), note)
 
-    def sight(self, pose: Pose, gimbal: Gimbal | None = None, intrinsics: Intrinsics | None = None) -> Sight:
+    def sight(
+        self, pose: FramePose, gimbal: Gimbal | None = None, intrinsics: Intrinsics | None = None
+    ) -> Sight:
         """The camera at a pose, turned as the report's gimbal says, else as it is mounted."""
         east, south = self.frame.to_metres([[pose.lat, pose.lon]])[0]
         level = self.mount.stabilised if gimbal is None else False
@@ -106,7 +132,14 @@ class CameraSensor:
             max_range_m=self.max_range_m,
             min_grazing_deg=self.min_grazing_deg,
         )
-        return self._worth(looks)
+        footprint = self._worth(looks)
+        if footprint.counts.any():
+            return footprint
+        height = float(sight.position[2])
+        seen = "no cell of the grid is in view"
+        if len(looks.cells):
+            seen = f"no cell is seen well enough (at best p_tp {looks.p_tp.max():.2f}, {looks.covered.max():.0%} of it)"
+        return footprint.in_vain(f"{seen} from {height:.0f} m above the launch point")
 
     def _worth(self, looks: Looks) -> Footprint:
         """A false alarm comes from the part of a cell that is in view, so 1 - p_tn is as much less."""
@@ -145,7 +178,36 @@ class CameraSensor:
 
     # ---- detections --------------------------------------------------------------------------------------
 
-    def _spot(self, sight: Sight, seen: Detection) -> Spot | None:
+    def _checked(self, report: Report, sight: Sight) -> list[Detection]:
+        """The detections with boxes in pixels; raises Unreadable for one that cannot be where the frame looks."""
+        outline, camera = report.footprint, sight.camera
+        gap = beside_image(sight, self.frame, self.ground, self.max_range_m)
+        if outline is not None:
+            gap = beside_outline(self.frame.to_metres(outline), sight, self.frame)
+        checked = []
+        for seen in report.detections:
+            if seen.box is not None:
+                box = report.in_pixels(seen.box, camera.width, camera.height)
+                check_box(box, camera.width, camera.height)
+                seen = seen.model_copy(update={"box": box})
+            else:
+                far = min(self.max_range_m, float(sight.position[2]) * 10.0)
+                camera_m = math.hypot(self.errors.position_m, far * math.radians(self.errors.attitude_deg))
+                check_place(seen, gap, self.frame.cell_m + SIGMAS * max(camera_m, seen.accuracy_m or 0.0))
+            checked.append(seen)
+        return checked
+
+    def _less_what_is_behind(
+        self, footprint: Footprint, sight: Sight, box: tuple[float, float, float, float]
+    ) -> Footprint:
+        """A detection that cannot be placed, near the horizon, says nothing of the cells that lie behind it."""
+        flat: Floats = np.asarray((footprint.cells[:, ::-1] + 0.5) * self.frame.cell_m, dtype=np.float64)
+        points: Floats = np.column_stack([flat, self.ground.height_at(flat)])
+        margin = SIGMAS * sight.camera.focal_px * math.radians(self.errors.attitude_deg)
+        hidden = behind_box(sight, points, box, margin + 0.5 * (box[3] - box[1]))
+        return replace(footprint, counts=footprint.counts & ~hidden)
+
+    def spot(self, sight: Sight, seen: Detection) -> Spot | None:
         """Where a detection is on the ground; None where that cannot be told."""
         if seen.box is not None:
             x0, y0, x1, y1 = seen.box
@@ -154,7 +216,8 @@ class CameraSensor:
             return locate_pixel(sight, middle, sigma, self.ground, self.errors, self.max_range_m)
         point = self.frame.to_metres(np.array([[seen.lat, seen.lon]], dtype=np.float64))[0]
         if seen.accuracy_m is not None:
-            return Spot(point, np.eye(2) * seen.accuracy_m**2)
+            # it lies in what the frame shows: an accuracy worse than the range says no more than that
+            return Spot(point, np.eye(2) * min(seen.accuracy_m, self.max_range_m) ** 2)
         there = np.array([[*point, float(self.ground.height_at(point[None])[0])]])
         pixels, depth = sight.project(there)
         located = None
@@ -162,14 +225,15 @@ class CameraSensor:
             located = locate_pixel(sight, pixels[0], (1.0, 1.0), self.ground, self.errors, self.max_range_m)
         return Spot(point, located.covariance if located else np.eye(2) * self.frame.cell_m**2)
 
-    def _sighting(self, spot: Spot, seen: Detection) -> Sighting:
+    def _sighting(self, spot: Spot, seen: Detection, report: Report) -> Sighting:
         lat, lon = self.frame.from_metres(spot.point[None])[0]
         c = spot.covariance
         square = (float(c[0, 0]), float(c[0, 1]), float(c[1, 1]))
-        return Sighting(float(lat), float(lon), square, seen.thumbnail)
+        score = None if seen.score is None else report.share(seen.score)
+        return Sighting(float(lat), float(lon), square, report.picture_of(seen), score)
 
 
-def _attitude(pose: Pose) -> tuple[float, float]:
+def _attitude(pose: FramePose) -> tuple[float, float]:
     """Pitch and roll; level where the telemetry has not told them."""
     known = math.isfinite(pose.pitch_deg) and math.isfinite(pose.roll_deg)
     return (pose.pitch_deg, pose.roll_deg) if known else (0.0, 0.0)
@@ -199,7 +263,7 @@ def nominal_view(sensor: CameraSensor, height_m: float, cell_m: float) -> FieldO
         ValueError: no cell of that size is in view well enough to count.
     """
     frame = GridFrame(0.0, 0.0, 0.0, cell_m, 1, 1, -0.5 * cell_m, 0.5 * cell_m)
-    middle = Pose(0.0, 0.0, height_m, 0.0, 0.0)
+    middle = FramePose(0.0, 0.0, height_m, 0.0, 0.0)
     there = replace(sensor, frame=frame, ground=Flat())
     looks = look_at_cells(
         there.sight(middle), there.ground, frame, sensor.detect,

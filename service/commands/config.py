@@ -11,7 +11,9 @@ from pathlib import Path
 from service.config import (
     KNOWN_KEYS,
     Settings,
+    each_aircraft,
     file_problems,
+    name_of,
     nearest_key,
     read_settings,
     read_toml,
@@ -55,6 +57,11 @@ def main(arguments: list[str]) -> int:
         print(f"{options.file}: nothing is wrong; {len(changed)} of {len(KNOWN_KEYS)} settings are given")
     for key in KNOWN_KEYS if options.word == "show" else changed:
         print(f"  {key + ' = ' + _value(settings, key):44} {origin.get(key, 'default')}")
+    for name, alone in each_aircraft(settings).items() if settings.aircraft else ():
+        link, flight = alone.link.connect or "the built-in mock", alone.flight
+        own = next(table for number, table in enumerate(settings.aircraft) if name_of(table, number) == name)
+        sensor = "".join(f", {key} = {value!r}" for key, value in own.sensor.given.items())
+        print(f"  aircraft '{name}': {link}, {flight.altitude_m:g} m high, {flight.speed_mps:g} m/s{sensor}")
     for name in unknown_variables(os.environ):
         near = nearest_key(name.removeprefix("ROISEARCH_").lower().replace("_", ".", 1))
         hint = f"; did you mean {variable_name(near)}?" if near else ""

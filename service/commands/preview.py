@@ -32,6 +32,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--area", metavar="FILE", type=Path, required=True, help="as for the search")
     p.add_argument("--prior", metavar="TIF", type=Path, help="GeoTIFF of probabilities instead of the priors")
     p.add_argument("--config", metavar="FILE", type=Path, help="settings, see config/service.toml")
+    p.add_argument(
+        "--ground", metavar="FILE", action="append", help="heights of the ground, as for the search"
+    )
     p.add_argument("--cell", metavar="M", type=float, help="cell size in metres (from the sensor)")
     p.add_argument("--planner", metavar="NAME", help="who decides (puct-regions-lite)")
     p.add_argument("--seed", metavar="S", type=int, help="seed of the simulated detector (1)")
@@ -49,7 +52,12 @@ def main(arguments: list[str]) -> int:
         raise BadInput(f"--battery {options.battery:g}: give the minutes that a full battery flies")
     from service.config import read_settings
 
-    flags = {"sensor.cell_m": options.cell, "search.planner": options.planner, "run.seed": options.seed}
+    flags = {
+        "ground.file": options.ground,
+        "sensor.cell_m": options.cell,
+        "search.planner": options.planner,
+        "run.seed": options.seed,
+    }
     settings = read_settings(options.config, flags=flags)
     with _progress() as told:
         told("reading the area", 0.0)
@@ -57,7 +65,14 @@ def main(arguments: list[str]) -> int:
         from service.survey import survey
 
         area, grid = survey(options.area, options.prior, settings)
-        seen = preview(area, grid, settings, options.battery, told)
+        seen = preview(
+            area,
+            grid,
+            settings,
+            options.battery,
+            told,
+            lambda there: survey(options.area, options.prior, there)[1],
+        )
     from service.preview.text import text
 
     print(text(seen))

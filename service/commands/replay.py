@@ -32,20 +32,22 @@ def main(arguments: Sequence[str]) -> int:
     options = parser().parse_args(list(arguments))
     from service.config import read_settings
     from service.http import open_door
+    from service.http.past import Replayed
     from service.view.replay import ReplayView
 
     settings = read_settings(options.config, flags={"http.listen": options.http})
     view = ReplayView(options.run)
     with contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door:
-        server = door.server(view, view)
 
         async def serve() -> None:
+            past = Replayed(view)
+            server = door.server(past, past)
             loop = asyncio.get_running_loop()
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.add_signal_handler(number, setattr, server, "should_exit", True)
             await server.run_until_told()
 
         print(f"{view.area.name}: {len(view.rows)} events of {options.run}", flush=True)
-        print(f"listening on {door.url}", flush=True)
+        print(f"listening on {door.address}", flush=True)
         asyncio.run(serve())
     return 0

@@ -1,4 +1,4 @@
-"""`roisearch-service schema`: the JSON Schema of a detector report, for who writes a detector."""
+"""`roisearch-service schema`: the JSON Schema of a detector report, its receipt, or news from the field."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ import argparse
 
 def main(arguments: list[str]) -> int:
     """Print it."""
-    argparse.ArgumentParser(prog="roisearch-service schema", description=__doc__).parse_args(arguments)
-    from service.evidence.reports import schema_text
+    parser = argparse.ArgumentParser(prog="roisearch-service schema", description=__doc__)
+    parser.add_argument("of", nargs="?", choices=("report", "receipt", "news"), default="report")
+    of = parser.parse_args(arguments).of
+    from service.evidence.reports import receipt_schema, report_schema, schema_text
+    from service.news.request import news_schema
 
-    print(schema_text(), end="")
+    schemas = {"report": report_schema, "receipt": receipt_schema, "news": news_schema}
+    print(schema_text(schemas[of]()), end="")
     return 0

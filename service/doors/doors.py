@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from service.config import DoorSettings
-from service.doors.lines import SubmitAll
+from service.doors.lines import SubmitAll, limited
 from service.doors.mqtt import Broker, read_broker, serve_mqtt
 from service.doors.udp import bind_udp, serve_udp
 from service.doors.unix import bind_unix, serve_unix
@@ -27,6 +27,7 @@ class Doors:
     unix: socket.socket | None = None
     mqtt: Broker | None = None
     path: str = ""  # of the Unix socket
+    detections_per_s: float = 200.0  # at each of them
 
     async def serve(self, submit: SubmitAll) -> None:
         """Take in reports at every door until cancelled; one that fails is told and does not close the others."""
@@ -34,12 +35,16 @@ class Doors:
             if self.udp is not None:
                 host, port = self.udp.getsockname()[:2]
                 log.info("reports are taken at udp://%s:%d", f"[{host}]" if ":" in host else host, port)
-                group.create_task(_kept("UDP", serve_udp(self.udp, submit)))
+                group.create_task(_kept("UDP", serve_udp(self.udp, limited(submit, self.detections_per_s))))
             if self.unix is not None:
                 log.info("reports are taken at unix:%s", self.path)
-                group.create_task(_kept("Unix", serve_unix(self.unix, submit)))
+                group.create_task(
+                    _kept("Unix", serve_unix(self.unix, limited(submit, self.detections_per_s)))
+                )
             if self.mqtt is not None:
-                group.create_task(_kept("MQTT", serve_mqtt(self.mqtt, submit)))
+                group.create_task(
+                    _kept("MQTT", serve_mqtt(self.mqtt, limited(submit, self.detections_per_s)))
+                )
 
     def close(self) -> None:
         """Give the addresses up."""
@@ -59,7 +64,7 @@ def open_doors(settings: DoorSettings) -> Doors:
         udp = stack.enter_context(bind_udp(settings.udp)) if settings.udp else None
         unix = stack.enter_context(bind_unix(settings.unix)) if settings.unix else None
         stack.pop_all()  # all of them could be had: they stay
-    return Doors(udp, unix, mqtt, settings.unix)
+    return Doors(udp, unix, mqtt, settings.unix, settings.detections_per_s)
 
 
 async def _kept(name: str, serving: Coroutine[None, None, None]) -> None:

@@ -5,17 +5,22 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+import time
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 
 from pydantic import ValidationError
 
-from service.evidence.intake import JournalLost
 from service.evidence.reports import Receipt, Report
+from service.http.rate import Buckets
+from service.http.run import Unanswered
+from service.journal import JournalLost
 
 log = logging.getLogger("roisearch")
 SubmitAll = Callable[[Sequence[Report]], Awaitable[list[Receipt]]]
 _MOST_CHARACTERS = 300
 _MOST_LINES = 500  # read at once, before whatever else goes on has its turn
+_MOST_AT_ONCE = 1 << 16  # bytes of them, unless a single line has more
+LONGEST_LINE = 1 << 18
 
 
 async def answer(data: bytes, submit: SubmitAll) -> bytes:
@@ -23,12 +28,46 @@ async def answer(data: bytes, submit: SubmitAll) -> bytes:
 
     A line that is no report is answered like one that is refused, under its id if it has one.
     """
-    lines = [line for line in data.split(b"\n") if line.strip()]
     answers = []
-    for start in range(0, len(lines), _MOST_LINES):
-        answers.append(await _answer(lines[start : start + _MOST_LINES], submit))
+    for lines in _in_turns(data):
+        answers.append(await _answer(lines, submit))
         await asyncio.sleep(0)
     return b"".join(answers)
+
+
+def _in_turns(data: bytes) -> Iterator[list[bytes]]:
+    """The lines in `data`, so many at a time as are quickly read."""
+    lines: list[bytes] = []
+    size = 0
+    for line in data.split(b"\n"):
+        if not line.strip():
+            continue
+        if lines and (len(lines) == _MOST_LINES or size + len(line) > _MOST_AT_ONCE):
+            yield lines
+            lines, size = [], 0
+        lines.append(line)
+        size += len(line)
+    if lines:
+        yield lines
+
+
+def limited(submit: SubmitAll, detections_per_s: float) -> SubmitAll:
+    """A way in that refuses reports as soon as they bring more detections than that: each costs the flight some
+    milliseconds, while a frame in which nothing was seen costs next to nothing."""
+    buckets = Buckets()
+
+    async def taken(reports: Sequence[Report]) -> list[Receipt]:
+        refused: dict[int, Receipt] = {}
+        for number, report in enumerate(reports):
+            count = len(report.detections)
+            if count and buckets.take("", detections_per_s, time.monotonic(), count):
+                why = f"more than {detections_per_s:g} detections a second; send it again, and more slowly"
+                refused[number] = refusal(report.id, why)
+        rest = [report for number, report in enumerate(reports) if number not in refused]
+        receipts = iter(await submit(rest) if rest else ())
+        return [refused[number] if number in refused else next(receipts) for number in range(len(reports))]
+
+    return taken
 
 
 async def _answer(lines: Sequence[bytes], submit: SubmitAll) -> bytes:
@@ -37,7 +76,7 @@ async def _answer(lines: Sequence[bytes], submit: SubmitAll) -> bytes:
     try:
         taken = iter(await submit(reports) if reports else ())
     except Exception as error:  # a fault of ours must not close the door for the reports to come
-        if not isinstance(error, JournalLost):
+        if not isinstance(error, (JournalLost, Unanswered)):
             log.exception("reports could not be taken in")
         taken = iter([refusal(report.id, str(error)) for report in reports])
     receipts = [next(taken) if isinstance(each, Report) else each for each in parsed]
@@ -55,6 +94,8 @@ def as_line(receipt: Receipt) -> bytes:
 
 
 def _read(line: bytes) -> Report | Receipt:
+    if len(line) > LONGEST_LINE:  # not even looked at: a minute of JSON is no report
+        return refusal("", f"a line has at most {LONGEST_LINE} bytes")
     try:
         return Report.model_validate_json(line)
     except ValidationError as error:

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from service.doors.lines import SubmitAll, answer
+from service.cancelling import end_if_cancelled
+from service.doors.lines import SubmitAll, answer, as_line, refusal
 from service.errors import BadInput
 from service.secret_file import read_secret
 
@@ -26,6 +27,12 @@ log = logging.getLogger("roisearch")
 PORTS = {"mqtt": 1883, "mqtts": 8883}
 RETRY_S = 2.0
 _QOS = 1
+MOST_BYTES = 1 << 20
+"""Of a message; a longer one is not read."""
+MOST_GATHERED = 4 << 20
+"""Bytes of messages that wait while others are answered; what comes then is refused."""
+_RETAINED = "the broker had retained it, so it may be of another day; publish reports without retain"
+_MOST_QUEUED = 1000  # messages between the client library and us
 
 
 @dataclass(frozen=True)
@@ -41,11 +48,11 @@ class Broker:
     password: str | None = field(default=None, repr=False)
 
 
-def read_broker(url: str, topic: str, credentials_file: str) -> Broker:
-    """The broker of the settings. Raises BadInput when the URL, the topic or the credentials are none, or the client
-    library is missing."""
+def read_broker(url: str, topic: str, credentials_file: str, *, table: str = "doors") -> Broker:
+    """The broker of a table of the settings. Raises BadInput when the URL, the topic or the credentials are none, or
+    the client library is missing."""
     if importlib.util.find_spec("aiomqtt") is None:
-        raise BadInput("doors.mqtt needs the extra 'mqtt': pip install 'roisearch[mqtt]'")
+        raise BadInput(f"{table}.mqtt needs the extra 'mqtt': pip install 'roisearch[mqtt]'")
     try:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port
@@ -53,11 +60,11 @@ def read_broker(url: str, topic: str, credentials_file: str) -> Broker:
         host, port = None, None
     if not host or parts.scheme not in PORTS or parts.path.strip("/") or parts.username is not None:
         raise BadInput(
-            f"doors.mqtt = '{_without_password(url)}' is not a broker; give mqtt://HOST:PORT, or mqtts:// for "
-            "TLS, and credentials in doors.mqtt_credentials_file"
+            f"{table}.mqtt = '{_without_password(url)}' is not a broker; give mqtt://HOST:PORT, or mqtts:// for "
+            f"TLS, and credentials in {table}.mqtt_credentials_file"
         )
     if not topic or any(sign in topic for sign in "+#\0"):
-        raise BadInput(f"doors.mqtt_topic = '{topic}' is not a topic; wildcards are not allowed")
+        raise BadInput(f"{table}.mqtt_topic = '{topic}' is not a topic; wildcards are not allowed")
     user = password = None
     if credentials_file:
         text = read_secret(credentials_file, "name and password of the MQTT broker").decode(
@@ -91,6 +98,7 @@ async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
                 username=broker.user,
                 password=broker.password,
                 tls_context=ssl.create_default_context() if broker.tls else None,
+                max_queued_incoming_messages=_MOST_QUEUED,
             ) as client:
                 granted = await client.subscribe(broker.topic, qos=_QOS)
                 if any(_refused(code) for code in granted):
@@ -103,7 +111,7 @@ async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
             if reason != told:
                 log.warning("the MQTT broker %s cannot be used (%s): trying again", broker.url, reason)
             told = reason
-            _end_if_cancelled()
+            end_if_cancelled()
         await asyncio.sleep(RETRY_S)
 
 
@@ -112,30 +120,41 @@ def _refused(code: int | ReasonCode) -> bool:
     return (code if isinstance(code, int) else code.value) >= 0x80
 
 
-def _end_if_cancelled() -> None:
-    """A task group that a broken connection and a cancellation reach together raises the former only."""
-    task = asyncio.current_task()
-    if task is not None and task.cancelling():
-        raise asyncio.CancelledError
-
-
 async def _listen(client: Client, broker: Broker, submit: SubmitAll) -> None:
     """Answer messages until the connection ends: all that have come while the last were answered, at once."""
     gathered: list[bytes] = []
+    refused: list[bytes] = []
     more = asyncio.Event()
 
     async def reply() -> None:
         while True:
+            end_if_cancelled()
             await more.wait()
             more.clear()
-            data = b"\n".join(gathered)
+            data, receipts = b"\n".join(gathered), b"".join(refused)
             gathered.clear()
-            if receipts := await answer(data, submit):
+            refused.clear()
+            receipts += await answer(data, submit)
+            if receipts:
                 await client.publish(f"{broker.topic}/receipts", receipts, qos=_QOS)
+
+    def take(message: bytes) -> None:
+        if len(message) > MOST_BYTES:
+            refused.append(as_line(refusal("", f"a message has at most {MOST_BYTES} bytes")))
+        elif sum(map(len, gathered)) + len(message) > MOST_GATHERED:
+            if len(refused) < _MOST_QUEUED:
+                why = "more is published than can be taken in; send it again, and more slowly"
+                refused.append(as_line(refusal("", why)))
+        else:
+            gathered.append(message)
 
     async with asyncio.TaskGroup() as group:
         group.create_task(reply())
         async for message in client.messages:
+            if message.retain:  # the broker has kept it, and a frame's time since boot may be of another day
+                refused.append(as_line(refusal("", _RETAINED)))
+                more.set()
+                continue
             payload = message.payload
-            gathered.append(payload if isinstance(payload, bytes) else str(payload).encode())
+            take(payload if isinstance(payload, bytes) else str(payload).encode())
             more.set()

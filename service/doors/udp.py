@@ -17,6 +17,7 @@ from service.http.address import bound_address, split_address
 log = logging.getLogger("roisearch")
 _BUFFER_BYTES = 4 << 20  # a burst waits in the kernel's memory rather than being lost
 _MOST_REPLY_BYTES = 60_000
+_MOST_WAITING = 256  # datagrams; more are dropped: who gets no receipt sends again
 
 
 def bind_udp(address: str) -> socket.socket:
@@ -48,18 +49,29 @@ class _Protocol(asyncio.DatagramProtocol):
     def __init__(self, submit: SubmitAll, group: asyncio.TaskGroup) -> None:
         self._submit, self._group = submit, group
         self._transport: asyncio.DatagramTransport | None = None
+        self._waiting = 0
+        self._dropped = False
 
     def connection_made(self, transport: asyncio.DatagramTransport) -> None:  # type: ignore[override]
         self._transport = transport
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        if self._waiting >= _MOST_WAITING:
+            if not self._dropped:
+                log.warning("more datagrams come than can be taken in: some are dropped, and get no receipt")
+            self._dropped = True
+            return
+        self._waiting += 1
         self._group.create_task(self._answer(data, addr))
 
     def error_received(self, exc: Exception) -> None:
         log.debug("UDP: %s", exc)  # a sender that has closed its socket does not hear its receipts
 
     async def _answer(self, data: bytes, addr: tuple[str, int]) -> None:
-        receipts = await answer(data, self._submit)
+        try:
+            receipts = await answer(data, self._submit)
+        finally:
+            self._waiting -= 1
         assert self._transport is not None
         while receipts:
             end = len(receipts)

@@ -9,12 +9,12 @@ import socket
 import stat
 from pathlib import Path
 
-from service.doors.lines import SubmitAll, answer, as_line, refusal
+from service.doors.lines import LONGEST_LINE, SubmitAll, answer, as_line, refusal
 from service.errors import BadInput
 
 _MODE = 0o660
 _CHUNK = 1 << 16
-_LONGEST_LINE = 1 << 18
+_MOST_CONNECTIONS = 64
 
 
 def bind_unix(path: str) -> socket.socket:
@@ -57,8 +57,14 @@ async def serve_unix(listener: socket.socket, submit: SubmitAll) -> None:
     async with asyncio.TaskGroup() as group:
 
         def connected(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            group.create_task(_talk(reader, writer, submit))
+            talks.difference_update([talk for talk in talks if talk.done()])
+            if len(talks) >= _MOST_CONNECTIONS:
+                writer.write(as_line(refusal("", f"{_MOST_CONNECTIONS} senders are connected already")))
+                writer.close()
+                return
+            talks.add(group.create_task(_talk(reader, writer, submit)))
 
+        talks: set[asyncio.Task[None]] = set()
         server = await asyncio.start_unix_server(connected, sock=listener)
         try:
             await asyncio.get_running_loop().create_future()
@@ -78,8 +84,8 @@ async def _talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, subm
             if newline:
                 writer.write(await answer(whole, submit))
                 await writer.drain()
-            if len(rest) > _LONGEST_LINE:
-                writer.write(as_line(refusal("", f"a line has at most {_LONGEST_LINE} bytes")))
+            if len(rest) > LONGEST_LINE:
+                writer.write(as_line(refusal("", f"a line has at most {LONGEST_LINE} bytes")))
                 break
         else:
             writer.write(await answer(rest, submit))  # the last line may lack its end

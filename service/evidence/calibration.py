@@ -76,7 +76,7 @@ def read_calibration(path: str) -> Calibration:
             )
     if "likelihood_ratio" in columns:
         return _of_ratios(path, lines, scores, columns["likelihood_ratio"])
-    return _of_roc(path, lines, scores, list(zip(columns["p_tp"], columns["p_tn"], strict=True)))
+    return of_roc(path, lines, scores, list(zip(columns["p_tp"], columns["p_tn"], strict=True)))
 
 
 def _of_ratios(path: str, lines: list[int], scores: list[float], ratios: list[float]) -> Calibration:
@@ -94,7 +94,7 @@ def _of_ratios(path: str, lines: list[int], scores: list[float], ratios: list[fl
     return Calibration(tuple(scores), tuple(math.log(ratio) for ratio in ratios))
 
 
-def _of_roc(
+def of_roc(
     path: str, lines: list[int], scores: list[float], points: list[tuple[float, float]]
 ) -> Calibration:
     for line, before, (p_tp, p_tn) in zip(lines, [(1.0, 0.0), *points], points, strict=False):

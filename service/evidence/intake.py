@@ -13,26 +13,36 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 import sqlite3
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 
+from service.area import Grid
 from service.clock import Clock
-from service.evidence.observe import Cell, Observation, Pose, Unreadable, observe
+from service.drawing import RegionsRow
+from service.entries import as_json, of_aircraft
+from service.evidence.counts import Counts
+from service.evidence.moments import Moments
+from service.evidence.observe import FramePose, Observation, Reading, Unreadable, observe
 from service.evidence.passes import Passes
+from service.evidence.plausible import check_pose
+from service.evidence.receipts import said_of
 from service.evidence.reports import Receipt, Report
 from service.evidence.sensors import Profile
-from service.evidence.verdict import ROW as VERDICT
-from service.evidence.verdict import verdict_on, verdict_row
-from service.journal import Journal, Row
+from service.evidence.verdict import verdict_on
+from service.evidence.waiting import Batch, Waiting
+from service.geometry import Cell
+from service.journal import Journal, JournalLost
+from service.known import Judgement, Known, Withdrawn
+from service.news.bearing import FieldNews
+from service.rows import ClockRow, NewsRow, ReportRow, VerdictRow, WithdrawnRow
 from service.search import Search
 
 log = logging.getLogger("roisearch")
-PoseAt = Callable[[float], Pose | None]
+PoseAt = Callable[[float], FramePose | None]
 PIECE, PIECE_S = (
     64,
     0.01,
@@ -41,65 +51,66 @@ PIECE, PIECE_S = (
 MOST_WAITING = 20_000
 MOST_IDS = 200_000  # what is older than these, the journal itself knows
 _MOST_CHARACTERS = 200
-AHEAD_S = 0.5  # how far in the future of the service's clock a frame may be: as far as a pose is carried on
 
 
-class JournalLost(RuntimeError):
-    """The journal cannot be written: nothing may be believed or acknowledged any more."""
-
-
-@dataclass(slots=True, eq=False)
-class _Waiting:
-    """A report on its way in; `receipt` is there once it has arrived."""
-
-    report: Report
-    arrived: float
-    captured: float
-    receipt: Receipt | None = None
-    error: Exception | None = None
-    batch: _Batch | None = None
-
-    def settle(self, receipt: Receipt | None, error: Exception | None = None) -> None:
-        """Say what became of it; the batch that it came with is told when it is the last of it."""
-        self.receipt, self.error = receipt, error
-        if self.batch is not None:
-            self.batch.open -= 1
-            if not self.batch.open and not self.batch.done.done():
-                self.batch.done.set_result(None)
-
-
-@dataclass(slots=True, eq=False)
-class _Batch:
-    open: int
-    done: asyncio.Future[None]
-
-
-@dataclass
 class Intake:
-    """Where reports go in. `pose_at` looks a capture time up in the telemetry, `time_of_boot` translates the
-    autopilot's time since boot; `told` is called after each applied observation with the time (perf_counter) at
-    which its report arrived, `believed` after each report with the seconds that it took. `history_s` is how far back
-    the telemetry remembers."""
+    """Where reports go in, and what has become of them so far."""
 
-    search: Search
-    sensor: Profile
-    journal: Journal
-    clock: Clock
-    pose_at: PoseAt
-    told: Callable[[Observation, float], None]
-    time_of_boot: Callable[[float], float | None] = lambda boot_s: None
-    believed: Callable[[float], None] = lambda seconds: None
-    history_s: float = 120.0
-    passes: Passes = field(default_factory=Passes)
-    accepted: int = 0
-    refused: int = 0
-    last_at: float = 0.0
-    _ids: OrderedDict[str, None] = field(default_factory=OrderedDict)
-    _waiting: list[_Waiting] = field(default_factory=list)
-    _working: asyncio.Task[None] | None = None
-    _believing: asyncio.Lock = field(
-        default_factory=asyncio.Lock
-    )  # what is believed keeps the journal's order
+    def __init__(
+        self,
+        search: Search,
+        sensor: Profile,
+        journal: Journal,
+        moments: Moments,
+        pose_at: PoseAt,
+        told: Callable[[Observation, float], None],
+        *,
+        believed: Callable[[float], None] = lambda seconds: None,
+        passes: Passes | None = None,
+    ) -> None:
+        """`moments` tells when a frame was taken, `pose_at` looks that up in the telemetry; `told` is called after each
+        applied observation with the time (perf_counter) at which its report arrived, `believed` after each report with
+        the seconds that it took."""
+        self.search, self.sensor, self.journal = search, sensor, journal
+        self.moments, self.pose_at, self.told, self.believed = moments, pose_at, told, believed
+        self.passes = Passes() if passes is None else passes
+        self.counts = Counts()
+        self._ids: OrderedDict[str, None] = OrderedDict()
+        self._waiting: list[Waiting] = []
+        self._working: asyncio.Task[None] | None = None
+
+    @property
+    def clock(self) -> Clock:
+        """The service's."""
+        return self.moments.clock
+
+    @property
+    def history_s(self) -> float:
+        """How far back the telemetry remembers."""
+        return self.moments.history_s
+
+    @property
+    def accepted(self) -> int:
+        """Reports taken in, by earlier runs of the same search too."""
+        return self.counts.accepted
+
+    @accepted.setter
+    def accepted(self, count: int) -> None:
+        self.counts.accepted = count
+
+    @property
+    def refused(self) -> int:
+        """Reports refused by this process."""
+        return self.counts.refused
+
+    @property
+    def last_at(self) -> float:
+        """When the last report was taken in; 0 before any was."""
+        return self.counts.accepted_at
+
+    @last_at.setter
+    def last_at(self, moment: float) -> None:
+        self.counts.accepted_at = moment
 
     async def submit(self, report: Report) -> Receipt:
         """Take one report in. Raises JournalLost when it could not be written."""
@@ -111,9 +122,9 @@ class Intake:
         Raises JournalLost when one could not be written; all may be sent again then.
         """
         arrived = time.perf_counter()
-        waiting = [_Waiting(report, arrived, report.captured_at) for report in reports]
+        waiting = [Waiting(report, arrived, report.captured_s) for report in reports]
         self._place(waiting)
-        batch = _Batch(0, asyncio.get_running_loop().create_future())
+        batch = Batch(0, asyncio.get_running_loop().create_future())
         for each in waiting:
             if each.receipt is None:
                 each.batch = batch
@@ -138,31 +149,50 @@ class Intake:
         while len(self._ids) > MOST_IDS:
             self._ids.popitem(last=False)
 
-    def recall(self, row: Row) -> None:
+    def recall(self, row: ReportRow) -> None:
         """Take up the passes that a report of an earlier run of the same search belongs to; rows come in their order.
 
-        Raises KeyError, TypeError or ValueError when this is no row of a report.
+        Raises ValueError when its report is none.
         """
-        report = Report.model_validate(row.body["report"])
-        captured = row.body.get("captured", row.time)  # not told by early versions
-        lat, lon, height, heading, pitch, roll = row.body["pose"]
+        report = Report.model_validate(row.report)
         with contextlib.suppress(Unreadable):  # the sensor may have been set otherwise since
-            reading = self.sensor.read(Pose(lat, lon, height, heading, captured, pitch, roll), report)
+            reading = self.sensor.read(row.pose, report)
             if report.usable:
-                observe(self.passes, report.source, captured, reading)
+                observe(self.passes, report.source, row.captured, reading)
         self.passes.settle()
 
     async def judge(self, cell: Cell, *, confirmed: bool) -> None:
         """Take in what an operator says about the place around `cell`; raises JournalLost."""
         reliability = self.search.settings.search.reject_reliability
         observation = verdict_on(cell, self.search.grid.frame.shape, reliability, confirmed=confirmed)
-        async with self._believing:
+        async with self.search.believing:  # what is believed keeps the journal's order
+            now = self.clock.now()
             try:
-                body = verdict_row(cell, observation, confirmed=confirmed)
-                await self.journal.append(self.clock.now(), VERDICT, body)
+                await self.journal.append(now, VerdictRow(confirmed, cell, observation))
             except (sqlite3.Error, OSError) as error:
                 raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
-            self.search.judge(cell, observation, confirmed=confirmed)
+            self.search.take(Judgement(cell, observation, confirmed), now)
+
+    async def hear(self, said: FieldNews | Withdrawn) -> None:
+        """Take in news, or take them back; raises JournalLost, and BadInput when that leaves no ground to fly over.
+
+        In a thread, and on a copy: all that was seen is reckoned anew, and the flight has its turns meanwhile.
+        """
+        row = NewsRow(said) if isinstance(said, FieldNews) else WithdrawnRow(said.id)
+
+        def reckoned(now: float) -> tuple[Known, Grid]:
+            known = self.search.known.copy()
+            known.take(said, now)
+            return known, self.search.ground_of(known)
+
+        async with self.search.believing:  # what is believed keeps the journal's order
+            now = self.clock.now()
+            known, grid = await asyncio.to_thread(reckoned, now)
+            try:
+                await self.journal.append(now, row)
+            except (sqlite3.Error, OSError) as error:
+                raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
+            self.search.go_back(known, grid)
 
     # ---- piece by piece
 
@@ -172,7 +202,7 @@ class Intake:
             self._waiting.sort(key=lambda each: each.captured)
             piece, self._waiting = self._waiting[:PIECE], self._waiting[PIECE:]
             try:
-                async with self._believing:
+                async with self.search.believing:  # what is believed keeps the journal's order
                     await self._take(piece)
             except asyncio.CancelledError:
                 self._fail([*piece, *self._waiting], JournalLost("the service is ending"))
@@ -181,17 +211,22 @@ class Intake:
                 self._fail(piece, error)  # whoever sent them hears of it
 
     @staticmethod
-    def _fail(waiting: Iterable[_Waiting], error: Exception) -> None:
+    def _fail(waiting: Iterable[Waiting], error: Exception) -> None:
         for each in waiting:
             if each.receipt is None:
                 each.settle(None, error)
 
-    async def _take(self, piece: list[_Waiting]) -> None:
+    async def _take(self, piece: list[Waiting]) -> None:
         """Work out what each report means, write them all, and then believe them."""
-        new: dict[str, tuple[_Waiting, Observation | None]] = {}
-        repeated: list[_Waiting] = []
+        new: dict[str, tuple[Waiting, Reading, Observation | None]] = {}
+        repeated: list[Waiting] = []
+        await self._read(piece)
         try:
             rows = self._understand(piece, new, repeated)
+            ties = self.moments.unwritten()
+            for tie in ties:  # before the reports that are put at their time by it
+                await self.journal.append(tie.service, ClockRow(tie))
+            self.moments.written(ties)
             fresh = await self.journal.append_all(rows)
         except Exception as error:
             self.passes.undo()  # whatever it was: the same reports may come again
@@ -200,106 +235,137 @@ class Intake:
             raise
         self.passes.settle()
         self.remember(new)
-        for (each, observation), is_new in zip(new.values(), fresh, strict=True):
+        for (each, reading, observation), is_new in zip(new.values(), fresh, strict=True):
             if is_new:
-                self._believe(each, observation)
+                self._believe(each, reading, observation)
             else:
                 repeated.append(each)
         for each in repeated:
             each.settle(Receipt(id=each.report.id, status="duplicate"))
+        await self._redraw()
+
+    async def _redraw(self) -> None:
+        """Go on with other regions of interest, if some are ready, once they are in the journal."""
+        now = self.clock.now()
+        if (sketch := self.search.redrawn(now)) is None:
+            return
+        with contextlib.suppress(sqlite3.Error, OSError):  # the mission sees that its journal is lost
+            await self.journal.append(now, RegionsRow(sketch.drawing))
+            known = self.search.drawing.words
+            self.search.take_sketch(sketch)
+            if sketch.drawing.words != known:
+                log.info("regions of interest: %s", sketch.drawing.words)
+
+    async def _read(self, piece: list[Waiting]) -> None:
+        """Work out what each frame shows, until the time is up; the rest waits again.
+
+        In a thread: a frame with hundreds of detections takes a second, in which the flight has its turns.
+        """
+        unread = [each for each in piece if each.report.id not in self._ids and self._placed(each)]
+
+        def read() -> int:
+            enough = time.perf_counter() + PIECE_S
+            for number, each in enumerate(unread):
+                if time.perf_counter() > enough:
+                    return number
+                assert each.pose is not None
+                try:
+                    each.reading = self.sensor.read(each.pose, each.report)
+                except Exception as fault:
+                    each.reading = fault
+            return len(unread)
+
+        if unread and (done := await asyncio.to_thread(read)) < len(unread):
+            start = piece.index(unread[done])
+            self._waiting += piece[start:]
+            del piece[start:]
+
+    def _placed(self, each: Waiting) -> bool:
+        """Whether it is known where the frame was taken."""
+        try:
+            each.pose = self._pose(each.report, each.captured)
+        except Unreadable as why:
+            each.reading = why
+        return each.pose is not None
 
     def _understand(
         self,
-        piece: list[_Waiting],
-        new: dict[str, tuple[_Waiting, Observation | None]],
-        repeated: list[_Waiting],
+        piece: list[Waiting],
+        new: dict[str, tuple[Waiting, Reading, Observation | None]],
+        repeated: list[Waiting],
     ) -> list[tuple[float, str, str, str]]:
-        """What each report means, until the time is up; the rest waits again. Returns the rows of those in `new`."""
+        """What each report means. Returns the rows of those in `new`."""
         rows: list[tuple[float, str, str, str]] = []
-        enough = time.perf_counter() + PIECE_S
-        for number, each in enumerate(piece):
-            if time.perf_counter() > enough:
-                self._waiting += piece[number:]
-                del piece[number:]
-                break
-            report = each.report
+        for each in piece:
+            report, reading = each.report, each.reading
             if report.id in self._ids or report.id in new:
                 repeated.append(each)
                 continue
-            try:
-                pose = self._pose(report, each.captured)
-                reading = self.sensor.read(pose, report)
-            except Unreadable as why:
-                self._refuse(each, str(why))
+            if isinstance(reading, Unreadable):
+                self._refuse(each, str(reading))
                 continue
-            except Exception as fault:  # one report that we cannot work out must not cost the others theirs
-                log.exception("report %r could not be read", report.id)
-                why_not = f"{type(fault).__name__}: {fault}"[:_MOST_CHARACTERS]
+            if isinstance(
+                reading, Exception
+            ):  # one report that cannot be worked out must not cost the others theirs
+                log.error("report %r could not be read", report.id, exc_info=reading)
+                why_not = f"{type(reading).__name__}: {reading}"[:_MOST_CHARACTERS]
                 self._refuse(
                     each,
                     f"what the frame shows cannot be worked out ({why_not}); check its pose, gimbal and intrinsics",
                 )
                 continue
+            assert each.pose is not None
+            assert reading is not None
             observation = None
             if report.usable:
                 observation = observe(self.passes, report.source, each.captured, reading)
-            new[report.id] = (each, observation)
-            body = _row(report, pose, each.captured, observation)
-            rows.append((self.clock.now(), "report", f"report {report.id}", body))
+            new[report.id] = (each, reading, observation)
+            row = _row(report, each.pose, each.captured, observation)
+            body = as_json(of_aircraft(row, self.search.aircraft))
+            rows.append((self.clock.now(), row.kind, row.key, body))
         return rows
 
-    def _believe(self, each: _Waiting, observation: Observation | None) -> None:
-        self.accepted += 1
-        self.last_at = self.clock.now()
+    def _believe(self, each: Waiting, reading: Reading, observation: Observation | None) -> None:
         looks = hits = 0
         if observation is not None:
-            self.search.apply(observation)
+            self.search.take(observation, each.captured)
             self.told(observation, each.arrived)
             looks, hits = len(observation.cells), int(observation.hits.sum())
         self.believed(time.perf_counter() - each.arrived)
-        each.settle(Receipt(id=each.report.id, status="accepted", looks=looks, hits=hits))
+        why = said_of(each.report, reading, looks, hits)
+        self.counts.took_in(self.clock.now(), why if not looks else "")
+        each.settle(Receipt(id=each.report.id, status="accepted", reason=why, looks=looks, hits=hits))
 
     # ---- when and where
 
-    def _place(self, waiting: list[_Waiting]) -> None:
+    def _place(self, waiting: list[Waiting]) -> None:
         """Put each report at its time of capture in the service's clock, or refuse it."""
+        self.moments.measure()
         now, room = self.clock.now(), MOST_WAITING - len(self._waiting)
         for each in waiting:
-            report, captured = each.report, each.captured
-            if report.id in self._ids:
+            if each.report.id in self._ids:
                 continue
             if room <= 0:
                 self._refuse(
                     each, f"{MOST_WAITING} reports are waiting already; send it again, and more slowly"
                 )
                 continue
-            if report.clock == "boot":
-                found = self.time_of_boot(captured)
-                if found is None:
-                    why = "is not in the telemetry: no position of the aircraft is known for it"
-                    self._refuse(each, f"captured_at {captured:.3f} s since boot {why}")
-                    continue
-                captured = each.captured = found
-            if captured < now - self.history_s:
-                self._refuse(
-                    each,
-                    f"captured_at {captured:.3f} is {now - captured:.1f} s ago, and the telemetry is kept for "
-                    f"{self.history_s:g} s: no position of the aircraft is known for it",
-                )
-            elif captured > now + AHEAD_S:
-                self._refuse(
-                    each,
-                    f"captured_at {captured:.3f} is {captured - now:.1f} s in the future of the service's clock, "
-                    "which GET /api/state tells",
-                )
+            try:
+                each.captured = self.moments.of(each.report, now)
+            except Unreadable as why:
+                self._refuse(each, str(why))
             else:
                 room -= 1
 
-    def _refuse(self, each: _Waiting, reason: str) -> None:
-        self.refused += 1
-        each.settle(Receipt(id=each.report.id, status="refused", reason=reason))
+    def refuse(self, report: Report, reason: str) -> Receipt:
+        """Count a report as refused; its receipt, with the reason."""
+        self.counts.refuse(self.clock.now(), report, reason)
+        return Receipt(id=report.id, status="refused", reason=reason)
 
-    def _pose(self, report: Report, captured: float) -> Pose:
+    def _refuse(self, each: Waiting, reason: str) -> None:
+        each.settle(self.refuse(each.report, reason))
+
+    def _pose(self, report: Report, captured: float) -> FramePose:
         """Where the frame was taken: as the report says, else as the telemetry of that time; raises Unreadable."""
         own, known = report.pose, self.pose_at(captured)
         if own is None:
@@ -309,18 +375,15 @@ class Intake:
                     f"captured_at {report.captured_at:.3f}"
                 )
             return known
+        if known is not None:
+            check_pose(own, known)
         pitch, roll = (known.pitch_deg, known.roll_deg) if known else (0.0, 0.0)
         pitch = own.pitch_deg if own.pitch_deg is not None else pitch
         roll = own.roll_deg if own.roll_deg is not None else roll
-        return Pose(own.lat, own.lon, own.height_m, own.heading_deg, captured, pitch, roll)
+        return FramePose(own.lat, own.lon, own.height_m, own.heading_deg, captured, pitch, roll)
 
 
-def _row(report: Report, pose: Pose, captured: float, observation: Observation | None) -> str:
-    """What the journal keeps of a report, as JSON; `captured` is in the service's clock."""
-    body = {
-        "report": report.model_dump(by_alias=True, exclude_unset=True),
-        "pose": [pose.lat, pose.lon, pose.height_m, pose.heading_deg, pose.pitch_deg, pose.roll_deg],
-        "captured": captured,
-        "observation": observation.to_dict() if observation else None,
-    }
-    return json.dumps(body)
+def _row(report: Report, pose: FramePose, captured: float, observation: Observation | None) -> ReportRow:
+    """What the journal keeps of a report; `captured` is in the service's clock."""
+    sent = report.model_dump(by_alias=True, exclude_unset=True)
+    return ReportRow(sent, replace(pose, time=captured), observation)

@@ -1,8 +1,7 @@
 """From a detector report to an observation: which cells were looked at, and which of them had a hit.
 
-A frame shows the cells of the field of view around the aircraft at the moment of capture. It counts as a look
-only when the aircraft was well enough centred on its cell for the footprint to cover the cells (`covered`),
-and high enough. How many looks the frames of the same ground are, `service.evidence.passes` decides.
+What a frame shows and says is for the sensor's profile to work out (`service.evidence.mask`, `service.camera.sensor`);
+how many looks the frames of the same ground are, `service.evidence.passes` decides.
 """
 
 from __future__ import annotations
@@ -15,21 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch import FieldOfView
-from service.area.frame import GridFrame
-from service.camera.locate import Spot, spread_hits
-from service.evidence.calibration import Calibration
 from service.evidence.passes import Look, Passes
-from service.evidence.reports import Report
+from service.geometry import Cell
 
 HEADINGS = ("north", "east", "south", "west")
-Cell = tuple[int, int]
+COURSE_FROM_MPS = 2.0  # ground speed from which the course is taken for the heading when that is not known
 
 
 @dataclass(frozen=True)
-class Pose:
-    """Where the aircraft was: degrees, metres above launch, seconds; nose from true north, up, and right wing
-    down, as `service.evidence.reports` says."""
+class FramePose:
+    """Where the aircraft was: degrees, metres above launch, seconds; nose from true north (NaN: not known), up, and
+    right wing down, as `service.evidence.reports` says."""
 
     lat: float
     lon: float
@@ -45,7 +40,8 @@ class Footprint:
     """The cells that a frame shows, and what a look at each of them is worth.
 
     cells int [k, 2]; covered float [k], the part of the cell that is in view (0..1); counts bool [k], whether that
-    is enough for a look; p_tp and p_tn float [k], the likelihoods of such a look.
+    is enough for a look; p_tp and p_tn float [k], the likelihoods of such a look. `why_not`: why no cell counts, for
+    people, where none does.
     """
 
     cells: NDArray[np.int64]
@@ -53,36 +49,52 @@ class Footprint:
     counts: NDArray[np.bool_]
     p_tp: NDArray[np.float64]
     p_tn: NDArray[np.float64]
+    why_not: str = ""
 
     @classmethod
     def alike(
-        cls, cells: NDArray[np.int64], *, covered: float, counts: bool, p_tp: float, p_tn: float
+        cls,
+        cells: NDArray[np.int64],
+        *,
+        covered: float,
+        counts: bool,
+        p_tp: float,
+        p_tn: float,
+        why_not: str = "",
     ) -> Footprint:
         """A footprint with the same for every cell."""
         k = len(cells)
-        return cls(cells, np.full(k, covered), np.full(k, counts), np.full(k, p_tp), np.full(k, p_tn))
+        each = np.full(k, covered), np.full(k, counts), np.full(k, p_tp), np.full(k, p_tn)
+        return cls(cells, *each, why_not)
+
+    def in_vain(self, why_not: str) -> Footprint:
+        """The same ground, of which nothing counts as a look."""
+        return replace(self, counts=np.zeros(len(self.cells), dtype=np.bool_), why_not=why_not)
 
 
 @dataclass(frozen=True)
 class Reading:
     """What a sensor makes of one report: the cells that the frame shows, and for each of them with a hit the
     likelihood ratio of it, P(hit | target there) / P(hit | target not there), above 0; and where its detections
-    are."""
+    are. `note`: what of the report does not count, for who sent it."""
 
     footprint: Footprint
     hits: Mapping[Cell, float]
     sightings: tuple[Sighting, ...] = ()
+    note: str = ""
 
 
 @dataclass(frozen=True)
 class Sighting:
     """One detection as the service places it: degrees, and the covariance of it in the grid's square metres as
-    (east-east, east-south, south-south), or None when nothing is known about its error."""
+    (east-east, east-south, south-south), or None when nothing is known about its error; where a picture of it is, and
+    the detector's score from 0 to 1."""
 
     lat: float
     lon: float
     covariance: tuple[float, float, float] | None = None
     thumbnail: str | None = None
+    score: float | None = None
 
 
 class Unreadable(ValueError):
@@ -134,6 +146,13 @@ class Observation:
         )
 
 
+def heading_or_course(heading_deg: float, north_mps: float, east_mps: float) -> float:
+    """Where the nose points; unless that is known the course over ground of an aircraft that moves, else NaN."""
+    if math.isfinite(heading_deg) or not math.hypot(north_mps, east_mps) >= COURSE_FROM_MPS:
+        return heading_deg
+    return math.degrees(math.atan2(east_mps, north_mps)) % 360.0
+
+
 def finite_or_level(angle_deg: float) -> float:
     """An angle of attitude; level until the vehicle has told it."""
     return angle_deg if math.isfinite(angle_deg) else 0.0
@@ -142,114 +161,17 @@ def finite_or_level(angle_deg: float) -> float:
 def _sighting(row: dict[str, Any]) -> Sighting:
     c = row["covariance"]
     covariance = None if c is None else (c[0], c[1], c[2])
-    return Sighting(row["lat"], row["lon"], covariance, row["thumbnail"])
+    return Sighting(row["lat"], row["lon"], covariance, row["thumbnail"], row.get("score"))
 
 
 def grid_heading(heading_deg: float, bearing_deg: float) -> str:
-    """The grid direction nearest to a true heading, for a grid whose north points to `bearing_deg`."""
-    return HEADINGS[round(((heading_deg - bearing_deg) % 360.0) / 90.0) % 4]
+    """The grid direction nearest to a true heading, for a grid whose north points to `bearing_deg`.
 
-
-@dataclass
-class Sensor:
-    """The sensor's profile on this grid: which cells a pose shows.
-
-    `overlap` is how much wider than a cell the footprint is (0.2: a fifth), so how far off the cell's centre
-    the aircraft may be and still see all of it.
+    A heading that is not known counts as the grid's north: whoever needs to know it asks before.
     """
-
-    frame: GridFrame
-    fov: FieldOfView
-    p_tp: float
-    p_tn: float
-    overlap: float
-    min_covered: float
-    height_m: float
-    calibration: Calibration | None = None
-
-    def read(self, pose: Pose, report: Report) -> Reading:
-        """The evidence in a report of a frame taken from `pose`.
-
-        Raises:
-            Unreadable: the report says what this profile cannot interpret.
-        """
-        if report.footprint is not None or report.gimbal is not None:
-            given = "footprint" if report.footprint is not None else "gimbal"
-            raise Unreadable(f"the sensor profile fixes what a frame shows: it has no use for a {given}")
-        if any(detection.box is not None for detection in report.detections):
-            raise Unreadable(
-                "the sensor profile cannot place a pixel box; give the lat and lon of each detection"
-            )
-        footprint = self.footprint(pose)
-        if self.calibration is not None and (looks := self.calibration.at(report.threshold)) is not None:
-            k = len(footprint.cells)
-            footprint = replace(footprint, p_tp=np.full(k, looks[0]), p_tn=np.full(k, looks[1]))
-        hits = self._hits(report, footprint)
-        return Reading(footprint, hits, sightings(report, self.frame, hits))
-
-    def footprint(self, pose: Pose) -> Footprint:
-        """The cells in view from `pose`; none when it is too low, off the grid or far between cells."""
-        nothing = self._alike(np.empty((0, 2), dtype=np.int64), 0.0)
-        if pose.height_m < 0.7 * self.height_m:
-            return nothing
-        east, south = (self.frame.to_metres([[pose.lat, pose.lon]])[0] / self.frame.cell_m).tolist()
-        rows, cols = self.frame.shape
-        if not (0.0 <= south < rows and 0.0 <= east < cols):
-            return nothing
-        cell: Cell = (math.floor(south), math.floor(east))
-        spare = 0.5 * self.overlap / (1.0 - self.overlap)
-        off = (abs(south - cell[0] - 0.5), abs(east - cell[1] - 0.5))
-        covered = math.prod(1.0 - min(max(along - spare, 0.0), 1.0) for along in off)
-        if covered < 0.5 * self.min_covered:
-            return nothing
-        heading = grid_heading(pose.heading_deg, self.frame.bearing_deg)
-        return self._alike(self.fov.cells(cell, heading, self.frame.shape), covered)
-
-    def _alike(self, cells: NDArray[np.int64], covered: float) -> Footprint:
-        counts = covered >= self.min_covered
-        return Footprint.alike(cells, covered=covered, counts=counts, p_tp=self.p_tp, p_tn=self.p_tn)
-
-    def _hits(self, report: Report, footprint: Footprint) -> dict[Cell, float]:
-        """The cells of the footprint that a detection lies in, or next to (its position is not exact); one with a
-        known accuracy is spread over all that it may lie in."""
-        if not report.detections or not len(footprint.cells):
-            return {}
-        sure = [
-            (Spot(self.frame.to_metres([[seen.lat, seen.lon]])[0], np.eye(2) * seen.accuracy_m**2), seen)
-            for seen in report.detections
-            if seen.lat is not None and seen.lon is not None and seen.accuracy_m is not None
-        ]
-        hits, _ = spread_hits(
-            [(spot, self._ratio(seen.score)) for spot, seen in sure],
-            footprint.cells, footprint.p_tp, footprint.p_tn, self.frame.cell_m,
-        )  # fmt: skip
-        cells, _ = self.frame.locate(np.array([[seen.lat, seen.lon] for seen in report.detections]))
-        for cell, seen in zip(cells, report.detections, strict=True):
-            if seen.accuracy_m is not None:
-                continue
-            gap = np.abs(footprint.cells - cell).max(axis=1)
-            nearest = int(gap.argmin())
-            if gap[nearest] <= 1:
-                row, col = (int(index) for index in footprint.cells[nearest])
-                hits[row, col] = max(self._ratio(seen.score), hits.get((row, col), 0.0))
-        return hits
-
-    def _ratio(self, score: float) -> float:
-        """What a hit with this score is worth."""
-        return self.p_tp / (1.0 - self.p_tn) if self.calibration is None else self.calibration.ratio(score)
-
-
-def sightings(report: Report, frame: GridFrame, hits: Mapping[Cell, float]) -> tuple[Sighting, ...]:
-    """The detections of a report that lie in the cells of `hits` or beside them."""
-    found = []
-    for seen in report.detections if hits else ():
-        if seen.lat is None or seen.lon is None:
-            continue
-        row, col = frame.to_cells([[seen.lat, seen.lon]])[0].tolist()
-        if any((row + r, col + c) in hits for r in (-1, 0, 1) for c in (-1, 0, 1)):
-            square = None if seen.accuracy_m is None else (seen.accuracy_m**2, 0.0, seen.accuracy_m**2)
-            found.append(Sighting(seen.lat, seen.lon, square, seen.thumbnail))
-    return tuple(found)
+    if not math.isfinite(heading_deg):
+        return HEADINGS[0]
+    return HEADINGS[round(((heading_deg - bearing_deg) % 360.0) / 90.0) % 4]
 
 
 def observe(passes: Passes, source: str, time: float, reading: Reading) -> Observation | None:

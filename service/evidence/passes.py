@@ -25,7 +25,8 @@ from bisect import bisect_left, bisect_right, insort
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-Cell = tuple[int, int]
+from service.geometry import Cell
+
 SILENT_S = 30.0
 
 

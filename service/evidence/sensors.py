@@ -14,12 +14,13 @@ import numpy as np
 
 from roisearch import FieldOfView
 from service.area import Grid, GridFrame
-from service.camera import Detectability, Errors, Flat, Ground, Pinhole, look_at_cells, read_terrain
+from service.camera import Detectability, Errors, Flat, Ground, Pinhole, look_at_cells, terrain_of
 from service.camera.sensor import CameraSensor, Mount, nominal_view
-from service.config import Settings
+from service.config import Settings, about, each_aircraft
 from service.errors import BadInput
 from service.evidence.calibration import calibration_of
-from service.evidence.observe import Footprint, Pose, Reading, Sensor
+from service.evidence.mask import Sensor
+from service.evidence.observe import Footprint, FramePose, Reading
 from service.evidence.reports import Report
 
 FIELDS_OF_VIEW: dict[str, Callable[[float, float], FieldOfView]] = {
@@ -33,8 +34,8 @@ _FINE = 40  # cells along the height of flight in which a footprint is measured
 class Profile(Protocol):
     """What the intake and the display need of a sensor."""
 
-    def footprint(self, pose: Pose) -> Footprint: ...
-    def read(self, pose: Pose, report: Report) -> Reading: ...
+    def footprint(self, pose: FramePose) -> Footprint: ...
+    def read(self, pose: FramePose, report: Report) -> Reading: ...
 
 
 def make_sensor(settings: Settings, grid: Grid) -> Profile:
@@ -52,10 +53,11 @@ def make_sensor(settings: Settings, grid: Grid) -> Profile:
             min_covered=sensor.min_covered,
             height_m=height,
             calibration=calibration_of(settings),
+            classes=frozenset(sensor.classes),
+            sigma_m=math.hypot(sensor.position_sigma_m, height * math.radians(sensor.attitude_sigma_deg)),
+            relief=grid.relief,
         )
-    ground: Ground = Flat()
-    if sensor.terrain_file:
-        ground = read_terrain(sensor.terrain_file, grid.frame, grid.launch, sensor.max_range_m)
+    ground: Ground = Flat() if grid.relief is None else terrain_of(grid.relief)
     return camera_sensor(settings, grid.frame, ground)
 
 
@@ -78,14 +80,42 @@ def cell_size(settings: Settings) -> float:
     One cell fills the shorter side of a footprint of the paper's profiles. A camera's is taken twice as fine, so that
     two rows or more are in view and a detection is told apart from its neighbours.
     """
-    sensor, height = settings.sensor, settings.flight.altitude_m
+    sensor = settings.sensor
     if sensor.cell_m is not None:
         return sensor.cell_m
     if sensor.profile == "camera":
         return round(0.5 * _shorter_side(settings) * (1.0 - sensor.overlap), 1)
-    angle = min(sensor.horizontal_fov_deg, sensor.vertical_fov_deg)
-    footprint = 2.0 * height * math.tan(math.radians(angle / 2.0))
-    return round(footprint * (1.0 - sensor.overlap), 1)
+    return round(_seen_m(settings) * (1.0 - sensor.overlap), 1)
+
+
+def cell_for_all(settings: Settings) -> float:
+    """The cell size in metres; where aircraft have sensors of their own, the smallest that one of them would have, so
+    that each sees a cell whole. Raises BadInput."""
+    if not any(each.sensor.given for each in settings.aircraft):
+        return cell_size(settings)
+    sizes = []
+    for (name, alone), own in zip(each_aircraft(settings).items(), settings.aircraft, strict=True):
+        with about(name):
+            sizes.append(cell_size(alone))
+            if own.sensor.given.keys() & {"horizontal_fov_deg", "vertical_fov_deg"}:
+                check_whole_cell(alone)
+    return min(sizes)
+
+
+def check_whole_cell(settings: Settings) -> None:
+    """Raises BadInput when a lens of the paper's profiles sees less than a cell of the size that is given."""
+    sensor, seen_m = settings.sensor, _seen_m(settings)
+    if sensor.profile != "camera" and sensor.cell_m is not None and seen_m < sensor.cell_m:
+        raise BadInput(
+            f"from {settings.flight.altitude_m:g} m its sensor sees {seen_m:.0f} m of the ground, less than a cell of "
+            f"{sensor.cell_m:g} m; fly it higher, give it a wider lens, or all of them smaller cells (sensor.cell_m)"
+        )
+
+
+def _seen_m(settings: Settings) -> float:
+    """The shorter side of what a sensor of the paper's profiles sees of flat ground, in metres."""
+    angle = min(settings.sensor.horizontal_fov_deg, settings.sensor.vertical_fov_deg)
+    return 2.0 * settings.flight.altitude_m * math.tan(math.radians(angle / 2.0))
 
 
 def camera_sensor(settings: Settings, frame: GridFrame, ground: Ground | None = None) -> CameraSensor:
@@ -127,6 +157,7 @@ def camera_sensor(settings: Settings, frame: GridFrame, ground: Ground | None = 
         max_range_m=sensor.max_range_m,
         min_grazing_deg=sensor.min_grazing_deg,
         calibration=calibration_of(settings),
+        classes=frozenset(sensor.classes),
         errors=Errors(sensor.attitude_sigma_deg, sensor.position_sigma_m, sensor.height_sigma_m),
     )
 
@@ -140,7 +171,7 @@ def _shorter_side(settings: Settings) -> float:
     """The shorter of a level camera's mean width and depth of view on flat ground, in metres."""
     fine = settings.flight.altitude_m / _FINE
     there = camera_sensor(settings, _unit_frame(fine))
-    pose = Pose(0.0, 0.0, settings.flight.altitude_m, 0.0, 0.0)
+    pose = FramePose(0.0, 0.0, settings.flight.altitude_m, 0.0, 0.0)
     looks = look_at_cells(
         there.sight(pose), there.ground, there.frame, there.detect,
         max_range_m=there.max_range_m, min_grazing_deg=there.min_grazing_deg, bounded=False,

@@ -12,55 +12,38 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roisearch.place import Place, likely_places
 from service.area.frame import GridFrame
-from service.evidence.observe import Cell, Sighting
+from service.evidence.found import IN_95_PERCENT, Found, Suspect
+from service.evidence.observe import Sighting
+from service.geometry import Cell
 
 MOST_SIGHTINGS = 1000
-IN_95_PERCENT = math.sqrt(
-    -2.0 * math.log(0.05)
-)  # semi-axes in standard deviations of a Gaussian in the plane
 
 
-@dataclass(frozen=True)
-class Found:
-    """The target's place: position in degrees, probability of the neighbourhood, the largest standard deviation in
-    metres, the ellipse that holds it with 95 % (semi-axes in metres, the long one's bearing from true north), and a
-    picture."""
-
-    lat: float
-    lon: float
-    probability: float
-    sigma_m: float
-    ellipse: dict[str, float]
-    thumbnail: str | None = None
-
-    @classmethod
-    def at(cls, frame: GridFrame, place: Place, near: Sequence[Sighting] = ()) -> Found:
-        """From a place of the grid and the detections in its square."""
-        point, covariance = _of_cells(frame, place)
-        known = _of_sightings(frame, place, near)
-        if known is not None and np.linalg.det(known[1]) < np.linalg.det(covariance):
-            point, covariance = known
-        lat, lon = frame.from_metres(point[None])[0]
-        values, vectors = np.linalg.eigh(covariance)
-        minor, major = np.sqrt(np.maximum(values, 0.0))
-        east, south = vectors[:, 1]
-        bearing = (math.degrees(math.atan2(east, -south)) + frame.bearing_deg) % 180.0
-        ellipse = {
-            "semi_major_m": round(float(major) * IN_95_PERCENT, 2),
-            "semi_minor_m": round(float(minor) * IN_95_PERCENT, 2),
-            "bearing_deg": round(bearing, 1) % 180.0,
-        }
-        pictures = [each.thumbnail for each in near if each.thumbnail is not None]
-        picture = pictures[-1] if pictures else None
-        return cls(float(lat), float(lon), place.probability, float(major), ellipse, picture)
+def found_at(frame: GridFrame, place: Place, near: Sequence[Sighting] = ()) -> Found:
+    """What is known of a place of the grid, from its cells and the detections in its square."""
+    point, covariance = _of_cells(frame, place)
+    known = _of_sightings(frame, place, near)
+    if known is not None and np.linalg.det(known[1]) < np.linalg.det(covariance):
+        point, covariance = known
+    lat, lon = frame.from_metres(point[None])[0]
+    values, vectors = np.linalg.eigh(covariance)
+    minor, major = np.sqrt(np.maximum(values, 0.0))
+    east, south = vectors[:, 1]
+    bearing = (math.degrees(math.atan2(east, -south)) + frame.bearing_deg) % 180.0
+    ellipse = {
+        "semi_major_m": round(float(major) * IN_95_PERCENT, 2),
+        "semi_minor_m": round(float(minor) * IN_95_PERCENT, 2),
+        "bearing_deg": round(bearing, 1) % 180.0,
+    }
+    pictures = [each.thumbnail for each in near if each.thumbnail is not None]
+    picture = pictures[-1] if pictures else None
+    return Found(float(lat), float(lon), place.probability, float(major), ellipse, picture)
 
 
 def _of_cells(frame: GridFrame, place: Place) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -119,14 +102,22 @@ class Sightings:
         kept = [(where, each) for where, each in self._all if not _beside(where, cell)]
         self._all = deque(kept, maxlen=MOST_SIGHTINGS)
 
-    def suspects(self, probability: NDArray[np.float64]) -> list[dict[str, Any]]:
+    def suspects(self, probability: NDArray[np.float64]) -> list[Suspect]:
         """The places with a hit that are not improbable, the most probable first, for people."""
-        found = []
+        found: list[Suspect] = []
         for place in likely_places(probability, self._hit):
             near = self.at(place.cell)
-            here = Found.at(self._frame, place, near)
-            told = {"lat": here.lat, "lon": here.lon, "probability": here.probability}
-            found.append({**told, "thumbnail": here.thumbnail, "hits": len(near)})
+            here = found_at(self._frame, place, near)
+            found.append(
+                {
+                    "lat": here.lat,
+                    "lon": here.lon,
+                    "probability": here.probability,
+                    "thumbnail": here.thumbnail,
+                    "hits": len(near),
+                    "score": max((each.score for each in near if each.score is not None), default=None),
+                }
+            )
         return sorted(found, key=lambda each: -each["probability"])
 
 

@@ -7,13 +7,10 @@ which is Bayes' rule for such a statement. It goes into the journal before it is
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from service.evidence.observe import Cell, Observation
-
-ROW = "verdict"
+from service.evidence.observe import Observation
+from service.geometry import Cell
 
 
 def verdict_on(cell: Cell, shape: tuple[int, int], reliability: float, *, confirmed: bool) -> Observation:
@@ -23,8 +20,3 @@ def verdict_on(cell: Cell, shape: tuple[int, int], reliability: float, *, confir
     k = len(cells)
     sure = np.full(k, reliability)
     return Observation(cells, np.full(k, confirmed), sure, sure.copy(), np.zeros(k, dtype=np.bool_))
-
-
-def verdict_row(cell: Cell, observation: Observation, *, confirmed: bool) -> dict[str, Any]:
-    """What the journal keeps of it."""
-    return {"confirmed": confirmed, "cell": list(cell), "observation": observation.to_dict()}

@@ -13,7 +13,7 @@ import shapely
 
 from service.area.prior import cell_squares
 from service.export.gaps import find_gaps
-from service.export.run import Find, Fix, Run
+from service.export.model import Find, Fix, Run
 from service.export.wishes import Wishes
 from service.view.shapes import on_earth
 
@@ -47,11 +47,17 @@ def items(run: Run, wishes: Wishes) -> list[Item]:
         *_ground(run),
         *_regions(run),
         *_gaps(run, wishes),
-        *(Item("track", f"track {number}", fixes=piece) for number, piece in enumerate(run.track, 1)),
+        *(Item("track", _called(number, piece), fixes=piece) for number, piece in enumerate(run.track, 1)),
         *(Item("hit", f"hit {number}", _point(*at)) for number, at in enumerate(run.hits, 1)),
         *_detections(run),
         *_found(run),
     ]
+
+
+def _called(number: int, piece: Sequence[Fix]) -> str:
+    """What a piece of the track is called."""
+    whose = f", aircraft {piece[0].aircraft}" if piece[0].aircraft else ""
+    return f"track {number}{whose}"
 
 
 def iso(time: float) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from service.export.run import Run
+    from service.export.model import Run
     from service.export.wishes import Wishes
 
 

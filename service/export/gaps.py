@@ -15,9 +15,9 @@ from scipy import ndimage
 
 from service.area.frame import BoolArray
 from service.area.prior import cell_squares
-from service.export.run import Run
+from service.export.model import Run
 from service.export.wishes import Wishes
-from service.mission.flight import LatLon
+from service.geometry import LatLon
 from service.view.shapes import on_earth
 
 _LEAST_M2 = 1.0

@@ -8,7 +8,7 @@ from typing import Any
 import shapely
 
 from service.export.features import Item, iso, items
-from service.export.run import Run
+from service.export.model import Run
 from service.export.wishes import Wishes
 from service.view.shapes import DIGITS, collection, feature, plain, point
 

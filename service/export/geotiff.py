@@ -15,7 +15,7 @@ from service.area.frame import GridFrame
 from service.area.geotiff import POA_BAND
 from service.errors import BadInput
 from service.export.features import iso
-from service.export.run import Run
+from service.export.model import Run
 from service.export.wishes import Wishes
 
 NODATA = -1.0

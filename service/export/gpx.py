@@ -1,4 +1,5 @@
-"""A run as GPX 1.1, for handheld receivers: the track, the launch, the find, hits, and the middle of each gap."""
+"""A run as GPX 1.1, for handheld receivers: a track for each aircraft, the launch, the find, hits, and the middle of
+each gap."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from collections.abc import Iterator
 
 from service.export.features import Item, iso, items
 from service.export.gaps import find_gaps
-from service.export.run import Run
+from service.export.model import Run
 from service.export.wishes import Wishes
 
 NAMESPACE = "http://www.topografix.com/GPX/1/1"
@@ -30,11 +31,11 @@ def write(run: Run, wishes: Wishes) -> bytes:
         _text(mark, "desc", note)
         _text(mark, "sym", SYMBOLS[role])
         _text(mark, "type", role)
-    if run.track:
+    for aircraft, pieces in run.tracks.items():
         track = ET.SubElement(root, _tag("trk"))
-        _text(track, "name", "flight")
+        _text(track, "name", f"flight of aircraft {aircraft}" if aircraft else "flight")
         _text(track, "desc", "heights are metres above the launch point")
-        for piece in run.track:
+        for piece in pieces:
             part = ET.SubElement(track, _tag("trkseg"))
             for fix in piece:
                 at = {"lat": f"{fix.lat:.7f}", "lon": f"{fix.lon:.7f}"}

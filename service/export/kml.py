@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from service.export.features import Item, iso, items
-from service.export.run import Run
+from service.export.model import Run
 from service.export.wishes import Wishes
 
 NAMESPACE = "http://www.opengis.net/kml/2.2"
@@ -60,13 +60,14 @@ def write(run: Run, wishes: Wishes) -> bytes:
             folder = ET.SubElement(document, _tag("Folder"))
             _text(folder, "name", name)
             for item in found:
-                _placemark(folder, item)
+                _placemark(folder, item, run.launch_amsl_m if run.grid.relief is not None else None)
     ET.indent(root)
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
 
 
-def _placemark(folder: ET.Element, item: Item) -> None:
-    """One thing; the order of the elements is that of the schema."""
+def _placemark(folder: ET.Element, item: Item, amsl_m: float | None) -> None:
+    """One thing; the order of the elements is that of the schema. A track is drawn at its heights where `amsl_m`, that
+    of the ground at the launch point, is known, else on the ground."""
     mark = ET.SubElement(folder, _tag("Placemark"))
     _text(mark, "name", item.name)
     if item.role in HIDDEN:
@@ -86,7 +87,14 @@ def _placemark(folder: ET.Element, item: Item) -> None:
     if item.shape is None:
         line = ET.SubElement(mark, _tag("LineString"))
         _text(line, "tessellate", "1")
-        _text(line, "coordinates", " ".join(f"{f.lon:.7f},{f.lat:.7f},{f.height_m:.1f}" for f in item.fixes))
+        if amsl_m is not None:
+            _text(line, "altitudeMode", "absolute")
+        up = amsl_m or 0.0
+        _text(
+            line,
+            "coordinates",
+            " ".join(f"{f.lon:.7f},{f.lat:.7f},{f.height_m + up:.1f}" for f in item.fixes),
+        )
     else:
         _geometry(mark, item.shape)
 

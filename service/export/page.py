@@ -7,47 +7,60 @@ from __future__ import annotations
 
 import base64
 import html
+import re
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from service.chances import sure
 from service.export.features import iso
 from service.export.gaps import Gap, find_gaps
-from service.export.pictures import WELL, draw_curve, draw_gaps, draw_map
-from service.export.run import Detection, Run
+from service.export.model import Detection, Run
+from service.export.pictures import WELL, draw_curve, draw_gaps, draw_maps
 from service.export.wishes import Wishes
+from service.mission.states import State
+from service.view.next import STATE_WORDS
 
 MOST_ROWS = 100
 SAME_S, LATELY = 30.0, 50
+_CHANGE = re.compile(rf"\b({'|'.join(State)}) → ({'|'.join(State)})\b")
 
 STYLE = """
-body { font: 16px/1.45 system-ui, sans-serif; color: #111; background: #fff; max-width: 60rem; margin: 1rem auto;
-  padding: 0 1rem; }
-h1 { font-size: 1.6rem; margin: 0 0 .2rem; } h2 { font-size: 1.2rem; margin: 1.6rem 0 .4rem; }
-.lead { font-size: 1.15rem; padding: .6rem .8rem; border-left: .4rem solid #2b8cbe; background: #eef5fa; }
-.found { border-color: #2a7a2a; background: #ecf7ec; }
-table { border-collapse: collapse; width: 100%; font-size: .92rem; }
-th, td { text-align: left; padding: .25rem .6rem .25rem 0; border-bottom: 1px solid #ddd; vertical-align: top; }
-img { max-width: 100%; height: auto; } .small { color: #444; font-size: .88rem; }
-@media print { body { max-width: none; margin: 0; } h2 { break-after: avoid; } img, table { break-inside: avoid; } }
+@page { size: A4; margin: 12mm; }
+body { font: 16px/1.45 system-ui, sans-serif; color: #0d1620; background: #fff; max-width: 60rem; margin: 1rem auto;
+  padding: 0 1rem; overflow-wrap: anywhere; }
+h1 { font-size: 1.6rem; margin: 0 0 .2rem; } h2 { font-size: 1.2rem; margin: 1.4rem 0 .4rem; }
+.lead { font-size: 1.15rem; padding: .6rem .8rem; border-left: .4rem solid #0b4aa2; background: #e9f0fa; }
+.found { border-color: #0a6b2f; background: #ecf7ec; }
+.wide { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: .92rem; }
+th, td { text-align: left; padding: .25rem .6rem .25rem 0; border-bottom: 1px solid #c3cad2; vertical-align: top;
+  min-width: 3.5rem; overflow-wrap: break-word; }
+img { max-width: 100%; height: auto; } .small { color: #46525f; font-size: .88rem; }
+.pair { display: flex; flex-wrap: wrap; gap: .5rem; } .pair p { flex: 1 1 20rem; margin: 0; }
+@media print { body { max-width: none; margin: 0; padding: 0; font-size: 10.5pt; } h2 { break-after: avoid; }
+  .pair { flex-wrap: nowrap; } .pair p { flex: 1 1 0; min-width: 0; } img, tr { break-inside: avoid; }
+  .wide { overflow: visible; } .appendix { break-before: page; } .appendix img { max-width: 60%; } }
 """
 
 
 def write(run: Run, wishes: Wishes) -> bytes:
-    """The page, UTF-8."""
+    """The page, UTF-8: in print the first sheet is what everybody reads, and the rest an appendix."""
     gaps = find_gaps(run, wishes)
     title = f"Search report: {run.area.name}"
+    belief, searched = draw_maps(run)
     parts = [
         f"<h1>{_safe(title)}</h1>",
         f'<p class="small">Run {_safe(run.name)}, {_day(run.began)} to {_day(run.last)}. {_status(run)}</p>',
         _lead(run),
-        _numbers(run),
         "<h2>What was searched, and how well</h2>",
-        _picture(
-            draw_map(run), "Two maps: the probability that is left, and how well each cell was searched"
-        ),
-        "<p>Left: where the target may be now, after everything that was seen and not seen. Right: how probable "
-        "it is that the looks so far would have found it there. Both are turned with the grid.</p>",
+        '<div class="pair">',
+        _picture(belief, "A map of the probability that is left, north up"),
+        _picture(searched, "A map of how well each cell was searched, north up"),
+        "</div>",
+        "<p>First: where the target may be now, after everything that was seen and not seen. Second: how probable "
+        "it is that the looks so far would have found it there. North is up.</p>",
+        _numbers(run),
+        '<section class="appendix">',
         _regions(run),
         "<h2>Where not</h2>",
         *_where_not(run, gaps, wishes),
@@ -55,12 +68,16 @@ def write(run: Run, wishes: Wishes) -> bytes:
         *_what_was_found(run),
         "<h2>How it went</h2>",
         _picture(draw_curve(run), "The probability of success over time"),
-        _table(("time (UTC)", "what happened"), ((_clock(m.time), m.text) for m in run.timeline[:MOST_ROWS])),
+        _table("What happened", ("time (UTC)", "what happened"), _happened(run)),
         _more(len(run.timeline)),
         "<h2>How to read this</h2>",
         _words(run),
+        "</section>",
     ]
-    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{_safe(title)}</title>'
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{_safe(title)}</title>"
+    )
     page = f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{STYLE}</style></head>\n<body><main>\n'
     return (page + "\n".join(parts) + "\n</main></body></html>\n").encode()
 
@@ -77,9 +94,14 @@ def _lead(run: Run) -> str:
     """The one paragraph that everybody reads."""
     if run.find is not None:
         find = run.find
+        how = (
+            f"confirmed by an operator; the map gives it {sure(find.probability)}"
+            if find.confirmed
+            else f"with a probability of {sure(find.probability)}"
+        )
         text = (
-            f"<strong>Found</strong> at {find.lat:.6f}, {find.lon:.6f} at {_clock(find.time)} UTC, with a probability "
-            f"of {_sure(find.probability)}. If it is there, it is within {find.ellipse[0]:.0f} m of that with 95 %."
+            f"<strong>Found</strong> at {run.written(find.lat, find.lon)} at {_clock(find.time)} UTC, {how}. If it is "
+            f"there, it is within {find.ellipse[0]:.0f} m of that with 95 %."
         )
         return f'<p class="lead found">{text}</p>'
     place = int(run.poa.argmax())
@@ -88,7 +110,7 @@ def _lead(run: Run) -> str:
     text = (
         f"<strong>Not found.</strong> If the target is where the search assumed it to be, it would have been "
         f"detected by now with a probability of <strong>{run.pos:.0%}</strong>. It is outside the area with "
-        f"{run.belief.outside:.0%}. The most likely cell is at {lat:.6f}, {lon:.6f}, with {run.poa.max():.1%}."
+        f"{run.belief.outside:.0%}. The most likely cell is at {run.written(lat, lon)}, with {run.poa.max():.1%}."
     )
     return f'<p class="lead">{text}</p>'
 
@@ -114,7 +136,7 @@ def _numbers(run: Run) -> str:
             f"{run.reports}, which made {run.looks} looks at cells and {len(run.hits)} hits",
         ),
     ]
-    return _table(("", ""), rows, head=False)
+    return _table("The search in numbers", ("", ""), rows, head=False)
 
 
 def _regions(run: Run) -> str:
@@ -125,22 +147,22 @@ def _regions(run: Run) -> str:
         first, now = float(run.grid.prior[inside].sum()), float(run.poa[inside].sum())
         before = first * (1.0 - run.grid.outside)
         pod = float((run.grid.prior[inside] * run.pod[inside]).sum() / first) if first > 0.0 else 0.0
-        rows.append((f"ROI {number}", f"{before:.1%}", f"{now:.1%}", f"{pod:.0%}"))
+        rows.append((run.region_names[number - 1], f"{before:.1%}", f"{now:.1%}", f"{pod:.0%}"))
     if not rows:
         return "<p>No place stood out before the search: the probability was spread evenly.</p>"
     heads = (
-        "region of interest",
+        "likely place",
         "probability before",
         "probability now",
         "POD, weighted by the probability before",
     )
-    return _table(heads, rows[:MOST_ROWS]) + _more(len(rows))
+    return _table("Likely places", heads, rows[:MOST_ROWS]) + _more(len(rows))
 
 
 def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
     level = f"a POD below {wishes.pod_below:.0%} and {wishes.poa_above:g} times an average cell's probability or more"
     if not gaps:
-        yield f"<p>There is no gap left: no ground has {level}.</p>"
+        yield f"<p>{_no_gap(run, level)}</p>"
     else:
         total = sum(gap.poa for gap in gaps)
         yield (
@@ -155,13 +177,27 @@ def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
                 f"{gap.poa:.1%}",
                 f"{gap.area_m2 / 1e4:.2f} ha",
                 f"{gap.pod:.0%}",
-                f"{gap.middle[0]:.6f}, {gap.middle[1]:.6f}",
+                run.written(*gap.middle),
                 "" if gap.flyable else "may not be flown over",
             )
             for number, gap in enumerate(gaps[:MOST_ROWS], 1)
         )
-        yield _table(("gap", "probability", "size", "POD so far", "middle (lat, lon)", ""), rows)
+        heads = ("gap", "probability", "size", "POD so far", "middle", "remark")
+        yield _table("Gaps", heads, rows)
         yield _more(len(gaps))
+
+
+def _no_gap(run: Run, level: str) -> str:
+    """That nothing is worth another flight, without saying more than was searched."""
+    ground = run.grid.searchable
+    never = float((ground & (run.pod <= 0.0)).sum()) / max(int(ground.sum()), 1)
+    if never == 0.0:
+        return f"There is no gap left: no ground has {level}."
+    left = float(run.poa[ground & (run.pod <= 0.0)].sum())
+    return (
+        f"{max(never, 0.01):.0%} of the ground was not searched at all; {left:.1%} of the probability lies there. None "
+        f"of it counts as a gap to fly again, which has {level}."
+    )
 
 
 def _what_was_found(run: Run) -> Iterable[str]:
@@ -176,7 +212,7 @@ def _what_was_found(run: Run) -> Iterable[str]:
             _clock(each[0].time),
             each[0].kind,
             f"{max(one.score for one in each):.2f}",
-            f"{each[0].lat:.6f}, {each[0].lon:.6f}",
+            run.written(each[0].lat, each[0].lon),
             each[0].source,
             f"{len(each)} frame" + ("s" if len(each) > 1 else ""),
             "a hit on the map"
@@ -185,7 +221,8 @@ def _what_was_found(run: Run) -> Iterable[str]:
         )
         for each in seen[:MOST_ROWS]
     )
-    yield _table(("time (UTC)", "class", "score", "place (lat, lon)", "detector", "seen in", ""), rows)
+    heads = ("time (UTC)", "class", "score", "place", "detector", "seen in", "counted as")
+    yield _table("What the detector reported", heads, rows)
     yield _more(len(seen))
 
 
@@ -206,6 +243,18 @@ def sightings(run: Run) -> list[list[Detection]]:
     return seen
 
 
+def _happened(run: Run) -> Iterable[tuple[str, str]]:
+    """The timeline, with the states as the page says them."""
+    for moment in run.timeline[:MOST_ROWS]:
+        text = _CHANGE.sub(_in_words, moment.text) if moment.kind == "state" else moment.text
+        yield _clock(moment.time), text
+
+
+def _in_words(change: re.Match[str]) -> str:
+    before, after = (STATE_WORDS[State(name)].lower() for name in change.groups())
+    return f"{before} → {after}"
+
+
 def _words(run: Run) -> str:
     sensor, flight = run.settings.sensor, run.settings.flight
     facts = [
@@ -222,10 +271,12 @@ def _words(run: Run) -> str:
     return "<ul>" + "".join(f"<li>{_safe(fact)}</li>" for fact in facts) + "</ul>"
 
 
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, head: bool = True) -> str:
+def _table(about: str, heads: Sequence[str], rows: Iterable[Sequence[str]], *, head: bool = True) -> str:
+    """A table; on a phone it may be wider than the screen, and is moved by a finger or by arrow keys."""
     top = "<thead><tr>" + "".join(f'<th scope="col">{_safe(h)}</th>' for h in heads) + "</tr></thead>"
     body = "".join("<tr>" + "".join(f"<td>{_safe(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table>{top if head else ''}<tbody>{body}</tbody></table>"
+    table = f"<table>{top if head else ''}<tbody>{body}</tbody></table>"
+    return f'<div class="wide" role="region" aria-label="{_safe(about)}" tabindex="0">{table}</div>'
 
 
 def _more(count: int) -> str:
@@ -239,10 +290,6 @@ def _picture(png: bytes, words: str) -> str:
 
 def _safe(text: str) -> str:
     return html.escape(text, quote=True)
-
-
-def _sure(probability: float) -> str:
-    return f"{probability:.2%}" if probability < 0.9999 else "over 99.99 %"
 
 
 def _day(time: float) -> str:

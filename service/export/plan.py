@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,10 +21,11 @@ import shapely
 from roisearch.detection import DetectionRecord
 from service.area import way_home
 from service.errors import BadInput
-from service.export.run import Run
+from service.export.model import Run
 from service.export.wishes import Wishes
-from service.mission.flight import LatLon
-from service.mission.navigator import Cell, straight_part
+from service.geometry import Cell, LatLon
+from service.ground.route import route_over
+from service.mission.navigator import straight_part
 from service.preview.foresight import foresee
 from service.preview.pace import climb_seconds, farthest_from_launch, route_seconds
 from service.search import Search
@@ -50,10 +52,14 @@ def write(run: Run, wishes: Wishes) -> bytes:
         raise BadInput(f"{run.name}: the target was found, so there is nothing left to plan for")
     route = mission_route(run, wishes)
     flight, launch = run.settings.flight, run.grid.launch
+    route, up = heights_of(run, route)
     items = [
         _item(CHANGE_SPEED, MISSION, [1, flight.speed_mps, -1, 0, 0, 0, 0]),
-        _item(TAKE_OFF, GLOBAL_RELATIVE, [0, 0, 0, None, *launch, flight.altitude_m]),
-        *(_item(WAYPOINT, GLOBAL_RELATIVE, [0, 0, 0, None, *at, flight.altitude_m]) for at in route),
+        _item(TAKE_OFF, GLOBAL_RELATIVE, [0, 0, 0, None, *launch, up[0]]),
+        *(
+            _item(WAYPOINT, GLOBAL_RELATIVE, [0, 0, 0, None, *at, height])
+            for at, height in zip(route, up[1:], strict=True)
+        ),
         _item(RETURN, MISSION, [0, 0, 0, 0, 0, 0, 0]),
     ]
     plan = {
@@ -76,11 +82,30 @@ def write(run: Run, wishes: Wishes) -> bytes:
     return json.dumps(plan, indent=2, allow_nan=False).encode()
 
 
+def heights_of(run: Run, route: list[LatLon]) -> tuple[list[LatLon], list[float]]:
+    """The waypoints, and the height of the take-off and of each of them above the launch point.
+
+    Over ground with heights there are more, so that each leg clears the ground, and the last is above the launch point:
+    the autopilot's own return from elsewhere might not.
+    """
+    relief, launch = run.grid.relief, run.grid.launch
+    if relief is None:
+        return route, [run.settings.flight.altitude_m] * (1 + len(route))
+    over = route_over(run.grid, relief, run.settings.flight, [launch, *route, launch])
+    if not all(math.isfinite(height) for height in over.heights):
+        raise BadInput(
+            f"{run.name}: the route leads over ground whose height is not known; give a larger ground file"
+        )
+    return list(over.points[1:]), list(over.heights)
+
+
 def mission_route(run: Run, wishes: Wishes) -> list[LatLon]:
     """The waypoints (lat, lon) in order, without take-off and landing."""
     search = Search(run.grid, run.settings)
-    search.belief = run.belief.copy()
-    search.record = DetectionRecord(run.poa, run.belief.outside)
+    search.known.belief = run.belief.copy()
+    search.known.record = DetectionRecord(
+        run.poa, run.belief.outside, walk=run.grid.walk, searchable=run.grid.searchable
+    )
     search.warm_up(lambda name, done, total: log.info("preparing the planner: %s (%d/%d)", name, done, total))
     reachable = float(run.poa[run.grid.flyable].sum())
     seen = foresee(
@@ -117,7 +142,7 @@ def _seconds(run: Run, wishes: Wishes) -> float:
     farthest = route_seconds(grid, flight, farthest_from_launch(grid), grid.launch)
     most = flight.max_flight_s if wishes.minutes is None else 60.0 * wishes.minutes
     landing = flight.return_height_m / flight.descent_mps
-    around = climb_seconds(flight) + 2.0 * farthest + landing
+    around = climb_seconds(flight, grid) + 2.0 * farthest + landing
     if most <= around:
         raise BadInput(
             f"{run.name}: {most / 60:g} minutes are too short: take-off, landing and the longest way there and home "

@@ -8,27 +8,22 @@ are read in one go, as they are at that moment, and the belief is replayed from 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from roisearch import Belief
-from service.area import Grid, SearchArea
-from service.area.frame import GridFrame
-from service.config import Settings
-from service.errors import BadInput
-from service.evidence.observe import Observation
-from service.evidence.suspects import IN_95_PERCENT
-from service.evidence.verdict import ROW as VERDICT
-from service.journal import Row
-from service.mission.flight import LatLon
-from service.mission.states import FINAL, Event, State
+from service.chances import sure
+from service.config import Settings, each_aircraft
+from service.entries import Entry, understanding
+from service.evidence.found import Found
+from service.export.model import Detection, Find, Fix, Moment, Run
+from service.mission.states import Event
+from service.places import Coordinates, written
 from service.resume import retrace, stored_run
+from service.rows import CommandRow, FoundRow, ModeRow, OrderRow, ReportRow, TransitionRow, VerdictRow
 from service.search import Search
+from service.story import StoriesSoFar
 from service.survey import JOURNAL
 from service.view.curve import PosCurve
 
@@ -36,156 +31,21 @@ BREAK_S = 60.0
 """A track is broken where nothing was heard of the aircraft for so long."""
 
 
-@dataclass(frozen=True)
-class Fix:
-    """Where the aircraft was: time, degrees, metres above launch, nose in degrees from true north."""
-
-    time: float
-    lat: float
-    lon: float
-    height_m: float
-    heading_deg: float
-
-
-@dataclass(frozen=True)
-class Detection:
-    """What a detector reported at a place (degrees); `counted`: the frame put a hit into the map."""
-
-    time: float
-    lat: float
-    lon: float
-    kind: str
-    score: float
-    source: str
-    counted: bool
-
-
-@dataclass(frozen=True)
-class Find:
-    """The place at which the search counted its target as found; `sigma_m` metres along the longest axis.
-
-    `ellipse` holds the target with 95 %: semi-axes in metres, and the bearing of the long one in degrees from true
-    north; a circle of that size for a journal that tells no more than sigma.
-    """
-
-    time: float
-    lat: float
-    lon: float
-    probability: float
-    sigma_m: float
-    ellipse: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Moment:
-    """Something that happened, for the timeline: what kind of thing, and in words."""
-
-    time: float
-    kind: str
-    text: str
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """One run. Arrays are [rows, cols]; times in the service's clock, seconds since the epoch.
-
-    Attributes:
-        name: of its folder.
-        belief: after all that was reported.
-        pod: cumulative probability of detection, cell by cell.
-        labels: regions of interest, 0 for none.
-        pos: probability of success so far; `curve` is (seconds of searching, pos).
-        track: the flight in unbroken pieces.
-        hits: centres of the cells that had a hit, in order.
-        autopilot: "px4" or "ardupilot", as it said when it was linked; empty before.
-        launch_amsl_m: how high the launch point is above sea level; None before the first waypoint.
-        state: the mission's last state; `over` is True when it can have no other.
-    """
-
-    name: str
-    area: SearchArea
-    grid: Grid
-    settings: Settings
-    belief: Belief
-    pod: NDArray[np.float64]
-    labels: NDArray[np.int32]
-    pos: float
-    looks: int
-    reports: int
-    curve: tuple[tuple[float, float], ...]
-    track: tuple[tuple[Fix, ...], ...]
-    hits: tuple[LatLon, ...]
-    detections: tuple[Detection, ...]
-    find: Find | None
-    timeline: tuple[Moment, ...]
-    autopilot: str
-    launch_amsl_m: float | None
-    state: str
-
-    @property
-    def frame(self) -> GridFrame:
-        """Cells to positions and back."""
-        return self.grid.frame
-
-    @property
-    def poa(self) -> NDArray[np.float64]:
-        """The probability now that the target is in each cell."""
-        return self.belief.probability()
-
-    @property
-    def over(self) -> bool:
-        """Whether the run has ended, as far as its journal knows: a killed one has not."""
-        return self.state in FINAL
-
-    @property
-    def began(self) -> float:
-        """When the first thing happened."""
-        return self.timeline[0].time
-
-    @property
-    def last(self) -> float:
-        """When the last thing was written down."""
-        return max(self.timeline[-1].time, *(piece[-1].time for piece in self.track), self.began)
-
-    @property
-    def aircraft(self) -> Fix | None:
-        """Where the aircraft was last."""
-        return self.track[-1][-1] if self.track else None
-
-    @property
-    def flown_m(self) -> float:
-        """Metres along the track."""
-        total = 0.0
-        for piece in self.track:
-            metres = self.frame.to_metres([(fix.lat, fix.lon) for fix in piece])
-            total += float(np.hypot(*np.diff(metres, axis=0).T).sum())
-        return total
-
-    @property
-    def summary(self) -> str:
-        """How it stands, in one sentence."""
-        done = f"probability of success {self.pos:.0%} after {self.looks} looks"
-        if self.find is not None:
-            place = f"{self.find.lat:.6f}, {self.find.lon:.6f}"
-            return f"found at {place} with probability {self.find.probability:.4f}; {done}"
-        return f"{self.state.lower()}, not found so far; {done}" if not self.over else f"not found; {done}"
-
-
 def read_run(folder: Path) -> Run:
     """Read a run from its folder, whether it is under way or over. Raises BadInput."""
-    settings, area, grid, rows = stored_run(folder)
-    search = Search(grid, settings)
-    curve = PosCurve()
-    for row in rows:
-        try:
-            retrace(row, search)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
-            raise BadInput(
-                f"{folder / JOURNAL}: row {row.seq} is no {row.kind} that is known ({error})"
-            ) from error
-        if row.kind == "report" and row.body["observation"] is not None:
-            curve.add(row.time, search.record.pos)
-    reports = [row for row in rows if row.kind == "report"]
+    settings, area, grid, entries = stored_run(folder)
+    search, curve, stories = Search(grid, settings), PosCurve(), StoriesSoFar(each_aircraft(settings))
+    finds: list[Find] = []
+    for entry in entries:
+        with understanding(folder / JOURNAL, entry.seq, entry.said.kind):
+            retrace(entry, search)
+            stories.take(entry, grid.frame)
+        if isinstance(entry.said, ReportRow) and entry.said.observation is not None:
+            curve.add(entry.time, search.record.pos)
+        elif isinstance(entry.said, FoundRow):
+            finds.append(_find(entry.time, entry.said.found))
+    how = settings.run.coordinates
+    reports = [entry for entry in entries if isinstance(entry.said, ReportRow)]
     return Run(
         name=folder.resolve().name,
         area=area,
@@ -198,73 +58,73 @@ def read_run(folder: Path) -> Run:
         looks=search.record.looks,
         reports=len(reports),
         curve=tuple(curve.points),
-        track=_pieces(fix for row in reports for fix in _fix(row)),
-        hits=_hits(grid.frame, reports),
-        detections=tuple(each for row in reports for each in _detections(row)),
-        find=_find(rows, search),
-        timeline=tuple(moment for row in rows for moment in _moment(row)) or (_first(rows[0]),),
-        autopilot=_autopilot(rows),
-        launch_amsl_m=_launch_amsl_m(rows, settings.flight.altitude_m),
-        state=_state(rows),
+        track=_track(reports, sorted(s.landed for each in stories.flights.values() for s in each.sorties)),
+        hits=tuple(stories.hits),
+        detections=tuple(each for entry in reports for each in _detections(entry)),
+        find=replace(finds[-1], confirmed=search.confirmed is not None)
+        if finds and stories.found is not None
+        else None,
+        timeline=tuple(moment for entry in entries for moment in _moment(entry, how))
+        or (_first(entries[0]),),
+        autopilot=_autopilot(entries),
+        launch_amsl_m=_launch_amsl_m(entries, settings) if grid.relief is None else grid.relief.launch_amsl_m,
+        state=stories.leading.state.value,
     )
 
 
-def _fix(row: Row) -> Iterable[Fix]:
+def _fix(entry: Entry) -> Iterable[Fix]:
     """The pose of a report, at the time of its frame."""
-    lat, lon, height, heading = (float(value) for value in row.body["pose"][:4])
-    if all(math.isfinite(value) for value in (lat, lon, height)):
-        yield Fix(_captured(row), lat, lon, height, heading)
+    assert isinstance(entry.said, ReportRow)
+    pose = entry.said.pose
+    if all(math.isfinite(value) for value in (pose.lat, pose.lon, pose.height_m)):
+        yield Fix(pose.time, pose.lat, pose.lon, pose.height_m, pose.heading_deg, entry.aircraft)
 
 
-def _captured(row: Row) -> float:
-    """When the frame was taken; of a detector with a clock of its own, when its report was written down."""
-    report = row.body["report"]
-    return float(report["captured_at"]) if report.get("clock", "unix") == "unix" else row.time
+def _track(reports: Sequence[Entry], landed: Sequence[float]) -> tuple[tuple[Fix, ...], ...]:
+    """The pieces of all aircraft, one aircraft after the other."""
+    fixes = [fix for entry in reports for fix in _fix(entry)]
+    names = dict.fromkeys(fix.aircraft for fix in fixes)
+    return tuple(
+        piece for name in names for piece in _pieces((fix for fix in fixes if fix.aircraft == name), landed)
+    )
 
 
-def _pieces(fixes: Iterable[Fix]) -> tuple[tuple[Fix, ...], ...]:
-    """The track, broken where time stands still for long or goes back, as it does when a run is resumed.
+def _pieces(fixes: Iterable[Fix], landed: Sequence[float]) -> tuple[tuple[Fix, ...], ...]:
+    """The track, broken at landings, and where time stands still for long or goes back, as when a run is resumed.
 
     Reports may come in another order than their frames were taken: a fix that is a little late is left out.
     """
     pieces: list[list[Fix]] = []
     for fix in fixes:
         since = fix.time - pieces[-1][-1].time if pieces else math.inf
-        if abs(since) > BREAK_S:
+        another = pieces and bisect_left(landed, fix.time) != bisect_left(landed, pieces[-1][-1].time)
+        if abs(since) > BREAK_S or another:
             pieces.append([fix])
         elif since > 0.0:
             pieces[-1].append(fix)
     return tuple(tuple(piece) for piece in pieces if len(piece) > 1)
 
 
-def _hits(frame: GridFrame, reports: Sequence[Row]) -> tuple[LatLon, ...]:
-    cells = []
-    for row in reports:
-        if row.body["observation"] is not None:
-            cells += Observation.from_dict(row.body["observation"]).speaking
-    return tuple((float(lat), float(lon)) for lat, lon in frame.to_latlon(np.array(cells).reshape(-1, 2)))
-
-
-def _detections(row: Row) -> Iterable[Detection]:
+def _detections(entry: Entry) -> Iterable[Detection]:
     """What a report has seen; one that is told in pixels stands where the service placed it, if it did."""
-    report: dict[str, Any] = row.body["report"]
-    observed = row.body["observation"]
-    seen = report.get("detections", ())
-    placed = (observed or {}).get("sightings", ())
+    assert isinstance(entry.said, ReportRow)
+    report, observed = entry.said.report, entry.said.observation
+    seen, whole = report.get("detections", ()), 100.0 if report.get("score_unit") == "percent" else 1.0
+    placed = observed.sightings if observed is not None else ()
     for number, each in enumerate(seen):
-        place = each
-        if each.get("lat") is None or each.get("lon") is None:
+        lat, lon = each.get("lat"), each.get("lon")
+        if lat is None or lon is None:
             if len(placed) != len(seen):
                 continue
-            place = placed[number]
+            lat, lon = placed[number].lat, placed[number].lon
         yield Detection(
-            time=_captured(row),
-            lat=float(place["lat"]),
-            lon=float(place["lon"]),
-            kind=_plain(each.get("class", "target")),
-            score=float(each.get("score", 1.0)),
+            time=entry.said.captured,
+            lat=float(lat),
+            lon=float(lon),
+            kind=_plain(str(each.get("class", "target"))),
+            score=float(each.get("score", whole)) / whole,
             source=_plain(report.get("source", "detector")),
-            counted=observed is not None and any(observed["hits"]),
+            counted=observed is not None and bool(observed.hits.any()),
         )
 
 
@@ -274,65 +134,47 @@ def _plain(text: object) -> str:
     return "".join(c if c.isprintable() else "?" for c in whole)
 
 
-def _find(rows: Sequence[Row], search: Search) -> Find | None:
-    """The last place that counted as found, unless an operator has rejected it since and it counts no more."""
-    find: Find | None = None
-    rejected = False
-    for row in rows:
-        body = row.body
-        if row.kind == "found":
-            radius = body["sigma_m"] * IN_95_PERCENT
-            known = body.get("ellipse") or {}
-            ellipse = (
-                float(known.get("semi_major_m", radius)),
-                float(known.get("semi_minor_m", radius)),
-                float(known.get("bearing_deg", 0.0)),
-            )
-            find = Find(row.time, body["lat"], body["lon"], body["probability"], body["sigma_m"], ellipse)
-            rejected = False
-        elif row.kind == VERDICT:
-            rejected = not body["confirmed"]
-    return None if rejected and search.found() is None else find
+def _find(time: float, found: Found) -> Find:
+    around = found.ellipse
+    ellipse = (around["semi_major_m"], around["semi_minor_m"], around["bearing_deg"])
+    return Find(time, found.lat, found.lon, found.probability, found.sigma_m, ellipse)
 
 
-def _moment(row: Row) -> Iterable[Moment]:
-    """What belongs into the timeline; decisions and waypoints are too many."""
-    body = row.body
-    if row.kind == "transition":
-        yield Moment(row.time, "state", f"{body['from']} → {body['to']}: {body['reason']}")
-    elif row.kind == "order":
-        yield Moment(row.time, "order", f"operator: {body['command']}")
-    elif row.kind == VERDICT:
-        yield Moment(row.time, "verdict", f"operator: {'it is' if body['confirmed'] else 'it is not'} here")
-    elif row.kind == "mode" and not body["commanded"]:
-        yield Moment(row.time, "mode", f"the autopilot changed to {body['mode']}")
-    elif row.kind == "found":
-        place = f"{body['lat']:.6f}, {body['lon']:.6f}"
-        yield Moment(row.time, "found", f"found at {place}, probability {body['probability']:.4f}")
+def _moment(entry: Entry, how: Coordinates) -> Iterable[Moment]:
+    """What belongs into the timeline, and of which aircraft it is; decisions and waypoints are too many."""
+    whose = f"aircraft {entry.aircraft}: " if entry.aircraft else ""
+    match entry.said:
+        case TransitionRow(before=before, after=after, reason=reason):
+            yield Moment(entry.time, "state", f"{whose}{before} → {after}: {reason}")
+        case OrderRow(command=command):
+            yield Moment(entry.time, "order", f"{whose}operator: {command}")
+        case VerdictRow(confirmed=confirmed):
+            yield Moment(entry.time, "verdict", f"operator: {'it is' if confirmed else 'it is not'} here")
+        case ModeRow(mode=mode, commanded=False):
+            yield Moment(entry.time, "mode", f"{whose}the autopilot changed to {mode}")
+        case FoundRow(found=found):
+            place = written((found.lat, found.lon), how)
+            yield Moment(entry.time, "found", f"found at {place}, {sure(found.probability)} sure")
 
 
-def _first(row: Row) -> Moment:
-    return Moment(row.time, "start", "the journal begins")
+def _first(entry: Entry) -> Moment:
+    return Moment(entry.time, "start", "the journal begins")
 
 
-def _state(rows: Sequence[Row]) -> str:
-    for row in reversed(rows):
-        if row.kind == "transition":
-            return str(row.body["to"])
-    return State.WAITING.value
-
-
-def _autopilot(rows: Sequence[Row]) -> str:
+def _autopilot(entries: Sequence[Entry]) -> str:
     """From the reason of the first transition, such as "px4 is ready"."""
-    for row in rows:
-        if row.kind == "transition" and row.body["event"] == Event.LINKED:
-            return str(row.body["reason"]).partition(" ")[0]
+    for entry in entries:
+        if isinstance(entry.said, TransitionRow) and entry.said.event == Event.LINKED:
+            return entry.said.reason.partition(" ")[0]
     return ""
 
 
-def _launch_amsl_m(rows: Sequence[Row], altitude_m: float) -> float | None:
-    """Every waypoint is flown `altitude_m` above the launch point, and says its height above the sea."""
-    for row in rows:
-        if row.kind == "command" and "alt_amsl_m" in row.body:
-            return float(row.body["alt_amsl_m"]) - altitude_m
+def _launch_amsl_m(entries: Sequence[Entry], settings: Settings) -> float | None:
+    """Every waypoint is flown `flight.altitude_m` of its aircraft above the launch point, and says its height above the
+    sea."""
+    each = each_aircraft(settings)
+    for entry in entries:
+        if isinstance(entry.said, CommandRow) and entry.said.alt_amsl_m is not None:
+            own = each.get(entry.aircraft, settings)
+            return entry.said.alt_amsl_m - own.flight.altitude_m
     return None

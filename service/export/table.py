@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterator
 
 from service.export.features import iso
-from service.export.run import Run
+from service.export.model import Run
 from service.export.wishes import Wishes
 
 COLUMNS = ("time_utc", "what", "lat", "lon", "height_m", "heading_deg", "probability", "note")
@@ -28,7 +28,8 @@ def _rows(run: Run) -> Iterator[tuple[float, tuple[str, ...]]]:
     for piece in run.track:
         for fix in piece:
             where = (f"{fix.lat:.7f}", f"{fix.lon:.7f}", f"{fix.height_m:.1f}", f"{fix.heading_deg:.0f}")
-            yield fix.time, ("track", *where, "", "")
+            note = f"aircraft {fix.aircraft}" if fix.aircraft else ""
+            yield fix.time, ("track", *where, "", harmless(note))
     for each in run.detections:
         note = harmless(f"{each.kind} of {each.source}" + ("" if each.counted else ", did not count"))
         place = (f"{each.lat:.7f}", f"{each.lon:.7f}", "", "")

@@ -19,6 +19,7 @@ from service.secret_file import read_secret
 
 COMMAND_VARIABLE = "ROISEARCH_HTTP_TOKEN"
 REPORT_VARIABLE = "ROISEARCH_HTTP_REPORT_TOKEN"
+VIEW_VARIABLE = "ROISEARCH_HTTP_VIEW_TOKEN"
 LEAST_CHARACTERS = 16
 
 
@@ -26,7 +27,9 @@ class Scope(enum.Enum):
     """What a token opens."""
 
     REPORT = "report"
-    """POST /api/reports, and GET /api/state, which a detector needs."""
+    """POST /api/reports, and everything that VIEW opens."""
+    VIEW = "view"
+    """All there is to see: the page without its orders."""
     COMMAND = "command"
     """Everything."""
 
@@ -70,7 +73,7 @@ def read_access(http: HttpSettings, environment: Mapping[str, str], *, loopback:
     """The tokens that the settings and the environment give; a file comes before a variable.
 
     Args:
-        environment: ROISEARCH_HTTP_TOKEN and ROISEARCH_HTTP_REPORT_TOKEN may hold tokens.
+        environment: ROISEARCH_HTTP_TOKEN, ROISEARCH_HTTP_REPORT_TOKEN and ROISEARCH_HTTP_VIEW_TOKEN may hold tokens.
         loopback: whether only this machine can reach the door.
 
     Raises:
@@ -83,14 +86,18 @@ def read_access(http: HttpSettings, environment: Mapping[str, str], *, loopback:
             f"listening on {http.listen} needs a token: name a file with one as http.token_file, "
             f"or set {COMMAND_VARIABLE}"
         )
-    if report and not command:
+    view = _read(http.view_token_file, VIEW_VARIABLE, environment)
+    named = {Scope.COMMAND: command, Scope.REPORT: report, Scope.VIEW: view}
+    keys = [(digest, scope) for scope, digest in named.items() if digest]
+    if keys and not command:
         raise BadInput(
-            "a report token alone leaves nobody to give commands; name a file with a command token "
+            f"a {keys[0][1].value} token alone leaves nobody to give commands; name a file with a command token "
             f"as http.token_file, or set {COMMAND_VARIABLE}"
         )
-    if report and report == command:
-        raise BadInput("the report token and the command token are the same; make two")
-    keys = [(digest, scope) for digest, scope in ((command, Scope.COMMAND), (report, Scope.REPORT)) if digest]
+    for number, (digest, scope) in enumerate(keys):
+        for other, same in keys[:number]:
+            if other == digest:
+                raise BadInput(f"the {scope.value} token and the {same.value} token are the same; make two")
     return Access(tuple(keys))
 
 

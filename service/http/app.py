@@ -4,38 +4,43 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import time
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
-from fastapi import Body, FastAPI, Query, Request, Response
+from fastapi import Body, FastAPI, Path, Query, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.models import Example
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse
-from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import Field
 from starlette.middleware.cors import CORSMiddleware
 
 from service.config import MOST_BATCH, HttpSettings
-from service.evidence.intake import JournalLost
-from service.evidence.reports import EXAMPLES, Command, Receipt, Report
+from service.errors import BadInput
+from service.evidence.reports import EXAMPLES, OrderReceipt, OrderRequest, Receipt, Report
 from service.http import examples
 from service.http.access import Access
 from service.http.docs import describe_api
 from service.http.events import Watchers
 from service.http.guard import Guard, Refusal, client_of, too_many
-from service.http.page import FOLDER, Parts, policy
+from service.http.page import FOLDER, PICTURE_HEADERS, Parts, policy
 from service.http.rate import Buckets
-from service.http.run import PastRun, Run
+from service.http.run import PastRun, Run, Sight, Unanswered
+from service.journal import JournalLost
+from service.news.request import EXAMPLES as NEWS_EXAMPLES
+from service.news.request import NewsRequest
+from service.view.state import HeardState, RunState
 from service.view.underlay import NO_UNDERLAY, Underlay
 
+log = logging.getLogger("roisearch")
 At = Annotated[
     float | None,
     Query(description="of a replay: the time to look at, seconds since the epoch", allow_inf_nan=False),
 ]
 Batch = Annotated[list[Report], Field(max_length=MOST_BATCH)]
 """Bounded before its reports are checked, which takes longer than reading them."""
-PNG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/png": {}}}}
 
 _MOST_COMPLAINTS = 8
 _MOST_CHARACTERS = 200
@@ -85,6 +90,19 @@ def create_app(
     async def journal_lost(_: Request, error: Exception) -> Response:
         return JSONResponse({"detail": str(error)}, status_code=503)
 
+    @app.exception_handler(Unanswered)
+    async def unanswered(_: Request, error: Exception) -> Response:
+        return JSONResponse({"detail": str(error)}, status_code=503)
+
+    @app.exception_handler(BadInput)
+    async def bad(_: Request, error: Exception) -> Response:
+        return JSONResponse({"detail": str(error)}, status_code=422)
+
+    @app.exception_handler(Exception)
+    async def at_fault(_: Request, error: Exception) -> Response:
+        log.error("a request could not be answered", exc_info=error)
+        return JSONResponse({"detail": "internal error"}, status_code=500)
+
     @app.exception_handler(RequestValidationError)
     async def not_valid(_: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
@@ -113,20 +131,49 @@ def create_app(
         wait = buckets.take(who, http.reports_per_s, time.monotonic(), len(batch))
         if wait:
             raise too_many(http.reports_per_s, wait)
+        detections = sum(len(report.detections) for report in batch)
+        if detections:
+            who, most = (client_of(request.scope), "detections"), http.detections_per_s
+            if wait := buckets.take(who, most, time.monotonic(), detections):
+                raise Refusal(429, f"more than {most:g} detections a second; try again in {wait:.1f} s", wait)
         return JSONResponse([receipt.model_dump() for receipt in await run.submit_all(batch)])
 
     @app.post(
         "/api/commands",
-        summary="Give an order: hold, resume, return or abort; confirm or reject a place",
+        summary="Give an order, to one aircraft or all: hold, resume, return, launch, finish, abort; confirm or reject",
+        response_model=OrderReceipt,
+        response_model_exclude_none=True,
         responses=examples.ORDERED,
     )
     async def commands(
-        command: Annotated[Command, Body(openapi_examples=examples.COMMANDS)],
-    ) -> dict[str, str]:
+        command: Annotated[OrderRequest, Body(openapi_examples=examples.COMMANDS)],
+    ) -> OrderReceipt:
         only_live()
-        return {"state": await run.order(command.command, command.place)}
+        return await run.order(command.command, command.place, command.aircraft, command.system_id)
 
-    def then(at: float | None) -> Run:
+    @app.post(
+        "/api/news",
+        summary="Tell news from the field: a clue, or ground that others have searched",
+        response_model=HeardState,
+        responses=examples.HEARD,
+    )
+    async def news(
+        feature: Annotated[NewsRequest, Body(openapi_examples=named_examples(NEWS_EXAMPLES))],
+    ) -> HeardState:
+        only_live()
+        return await run.hear(feature)
+
+    @app.post(
+        "/api/news/{name}/withdraw",
+        summary="Take news back: the belief is then what it would be had they never come",
+        response_model=HeardState,
+        responses=examples.HEARD,
+    )
+    async def withdraw(name: Annotated[str, Path(max_length=64)]) -> HeardState:
+        only_live()
+        return await run.withdraw(name)
+
+    def then(at: float | None) -> Sight:
         if at is None:
             return run
         if past is None:
@@ -136,10 +183,11 @@ def create_app(
     @app.get(
         "/api/state",
         summary="Where the search stands, and the footprint of a frame taken now",
+        response_model=RunState,
         responses=examples.STATE,
     )
     async def state(at: At = None) -> Response:
-        return JSONResponse(then(at).state())
+        return JSONResponse(await then(at).state())
 
     @app.get(
         "/api/map",
@@ -153,13 +201,14 @@ def create_app(
         ] = "cells",
     ) -> Response:
         if format == "geojson":
-            said = json.dumps(then(at).geojson(), allow_nan=False)
-            return Response(said, media_type="application/geo+json")
-        return JSONResponse(then(at).map())
+            return Response(await then(at).geojson(), media_type="application/geo+json")
+        return Response(await then(at).map(), media_type="application/json")
 
-    @app.get("/api/map.png", summary="The same as a picture", response_class=Response, responses=PNG)
+    @app.get(
+        "/api/map.png", summary="The same as a picture", response_class=Response, responses=examples.PICTURE
+    )
     async def picture(at: At = None) -> Response:
-        return Response(await asyncio.to_thread(then(at).picture()), media_type="image/png")
+        return Response(await then(at).picture(), media_type="image/png")
 
     @app.get(
         "/api/decisions",
@@ -169,7 +218,30 @@ def create_app(
     async def decisions(
         at: At = None, count: Annotated[int, Query(ge=1, le=_MOST_DECISIONS)] = 20
     ) -> list[dict[str, Any]]:
-        return await asyncio.to_thread(then(at).decisions, count)
+        return await then(at).decisions(count)
+
+    @app.get(
+        "/api/written",
+        summary="A place as the team writes places (run.coordinates)",
+        responses=examples.WRITTEN,
+    )
+    async def written(
+        lat: Annotated[float, Query(ge=-90, le=90, allow_inf_nan=False)],
+        lon: Annotated[float, Query(ge=-180, le=180, allow_inf_nan=False)],
+    ) -> dict[str, str]:
+        return {"written": run.written((lat, lon))}
+
+    @app.get(
+        "/api/pictures/{name}",
+        summary="A picture that came with a report",
+        response_class=Response,
+        responses=examples.JPEG,
+    )
+    async def kept_picture(name: Annotated[str, Path(max_length=80)]) -> Response:
+        data = await run.kept_picture(name)
+        if data is None:
+            raise Refusal(404, "there is no such picture")
+        return Response(data, media_type="image/jpeg", headers=PICTURE_HEADERS)
 
     @app.get(
         "/api/replay",
@@ -182,7 +254,7 @@ def create_app(
         first, last = past.span()
         return {"from": first, "to": last}
 
-    watchers = Watchers(run, {"tiles": underlay.describe(), "replay": past and list(past.span())})
+    watchers = Watchers(run, past, {"tiles": underlay.describe(), "replay": past and list(past.span())})
     app.add_api_websocket_route("/api/events", watchers.serve)
 
     @app.get("/tiles/{z}/{x}/{y}", include_in_schema=False)
@@ -194,17 +266,17 @@ def create_app(
 
     @app.get("/healthz", include_in_schema=False)
     async def healthy() -> Response:
+        await run.ready()  # a door behind which nobody answers is no sign of life
         return PlainTextResponse("ok\n")
 
     @app.get("/readyz", include_in_schema=False)
     async def ready() -> Response:
-        return PlainTextResponse(
-            "ready\n" if run.ready() else "waiting\n", status_code=200 if run.ready() else 503
-        )
+        is_ready = await run.ready()
+        return PlainTextResponse("ready\n" if is_ready else "waiting\n", status_code=200 if is_ready else 503)
 
     @app.get("/metrics", include_in_schema=False)
     async def metrics() -> Response:
-        return Response(generate_latest(run.registry), media_type=CONTENT_TYPE_LATEST)
+        return Response(await run.metrics(), media_type=CONTENT_TYPE_LATEST)
 
     @app.get("/", include_in_schema=False)
     async def page() -> Response:
@@ -219,23 +291,32 @@ def create_app(
     return app
 
 
+def named_examples(examples: Mapping[str, Any]) -> dict[str, Example]:
+    """Examples by what they say."""
+    return {name: {"summary": name, "value": value} for name, value in examples.items()}
+
+
 def openapi_examples(examples: Mapping[str, Any]) -> dict[str, Example]:
     """Examples by what they say, and all of them as one batch."""
-    single: dict[str, Example] = {name: {"summary": name, "value": value} for name, value in examples.items()}
-    return {**single, "a batch": {"summary": "a batch", "value": list(examples.values())}}
+    return {**named_examples(examples), "a batch": {"summary": "a batch", "value": list(examples.values())}}
 
 
 def complaints(error: RequestValidationError) -> list[dict[str, Any]]:
     """What was wrong with a request, without the input itself: it may hold what JSON cannot say (NaN, half a
     character), be very long, or be a secret that was sent to the wrong place."""
-    return [
-        {
-            "loc": [part if isinstance(part, int) else _printable(part) for part in found["loc"]],
-            "msg": _printable(found["msg"]),
-            "type": found["type"],
-        }
-        for found in error.errors()[:_MOST_COMPLAINTS]
-    ]
+    # a body may be one report or several; what is wrong with it as the other is no news
+    several = isinstance(error.body, list)
+    told = []
+    for found in error.errors():
+        place = list(found["loc"])
+        form = str(place[1]) if len(place) > 1 else ""  # a name that pydantic makes of the model's
+        if "Report" in form:
+            if form.startswith("list[") != several:
+                continue
+            del place[1]
+        shown = [part if isinstance(part, int) else _printable(part) for part in place]
+        told.append({"loc": shown, "msg": _printable(found["msg"]), "type": found["type"]})
+    return told[:_MOST_COMPLAINTS]
 
 
 def _printable(text: object) -> str:

@@ -19,7 +19,8 @@ EVENTS = """<section aria-labelledby="events"><h2 id="events"><code>WS /api/even
 <p>The run as it happens, for pages. Offer the subprotocol <code>roisearch</code> and, where a token is needed,
 <code>bearer.</code> followed by the command token in base64url; programs may send an <code>Authorization</code>
 header instead. The first message is the scene (area, grid, regions), every further one a moment, four times a
-second: the state, and of map, track, hits and POS curve what has changed.</p>
+second: the state, and of map, track, hits and POS curve what has changed. When the regions have been drawn again,
+<code>{"type": "regions", "regions": {...}, "names": [...], "drawn": 1}</code> comes before the moment.</p>
 <pre><code>{"type": "moment", "state": {"state": "SEARCHING", "pos": 0.31, ...},
  "belief": {"reference": 3, "log2_total": 0.0, "at": "base64, u32 cells", "codes": "base64, u8"},
  "pod": {"at": "...", "codes": "..."}, "track": {"from": 120, "rows": [[56.608, -4.742]]}}</code></pre>
@@ -66,6 +67,13 @@ def _operation(api: Schema, path: str, method: str, operation: Schema) -> Iterat
     shown = _example(answer)
     if shown is not None:
         yield f"<p>answers</p><pre><code>{escape(_pretty(shown))}</code></pre>"
+    refused = [(code, said) for code, said in operation["responses"].items() if code != "200"]
+    why = "".join(
+        f'<tr><th scope="row">{code}</th><td>{escape(said["description"])}</td></tr>'
+        for code, said in refused
+    )
+    head = '<tr><th scope="col">status</th><th scope="col">why</th></tr>'
+    yield f"<table><thead>{head}</thead><tbody>{why}</tbody></table>"
     yield "</section>"
 
 

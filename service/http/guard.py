@@ -12,8 +12,10 @@ import contextlib
 import ipaddress
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -36,10 +38,12 @@ SUBPROTOCOL = "roisearch"
 TOKEN_PROTOCOL = "bearer."
 """A browser cannot set the headers of a WebSocket, and a URL ends up in logs and histories: the token comes as one
 more subprotocol, base64url after this word. It is never chosen, so it is not sent back."""
-REPORT_ROUTES = frozenset({("POST", "/api/reports"), ("GET", "/api/state"), ("HEAD", "/api/state")})
-"""What a report token opens."""
+ORDERS = "/api/commands"
+MAY = "roisearch.scope"
+"""Under this name the ASGI scope says what the token of a request opens."""
 
 _LINGER_S = 1.0
+_PIECE_BYTES = 65_536
 _HEADERS = {
     "x-content-type-options": "nosniff",
     "x-frame-options": "DENY",  # nobody lays our buttons under theirs
@@ -97,6 +101,7 @@ class Guard:
         self._origins = frozenset(http.allowed_origins)
         self._buckets = buckets
         self._now = now
+        self._slots = Slots()
 
     async def __call__(self, scope: Request, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket":
@@ -110,21 +115,26 @@ class Guard:
             self._check_origin(scope, headers)
             self._check_token(scope, headers)
             self._check_rate(scope)
-            body = await self._body(headers, incoming)
+            with self._slots.taken(scope):
+                body = await self._body(headers, incoming)
+                await self._pass_on(scope, receive if body is None else _replay(body, receive), send)
         except Refusal as refusal:
             if _announces_body(headers):
                 await self._discard(incoming)
             await refusal.response(scope)(scope, receive, send)
-            return
+
+    async def _pass_on(self, scope: Request, receive: Receive, send: Send) -> None:
+        """Let the application answer."""
 
         async def send_safely(message: Message) -> None:
             if message["type"] == "http.response.start":
                 fields = MutableHeaders(scope=message)
                 for name, value in _HEADERS.items():
                     fields.setdefault(name, value)
-            await send(message)
+            for piece in _pieces(message):  # what is read slowly waits here, in its slot, and not in buffers
+                await send(piece)
 
-        await self._app(scope, receive if body is None else _replay(body, receive), send_safely)
+        await self._app(scope, receive, send_safely)
 
     async def _websocket(self, scope: Request, receive: Receive, send: Send) -> None:
         """A WebSocket passes the same checks before it is accepted (RFC 6455, 10.2: it has no same-origin policy)."""
@@ -145,7 +155,7 @@ class Guard:
         name = host_name(given[0]) if len(given) == 1 else None
         if name is not None and name in self._names:
             return
-        if name is not None and self._any_address and name == _local_address(request):
+        if name is not None and self._any_address and name == local_address(request):
             return
         raise Refusal(421, "this is not a name of this service; http.allowed_hosts lists more of them")
 
@@ -172,6 +182,7 @@ class Guard:
     def _check_token(self, request: Request, headers: Headers) -> None:
         route = (request.get("method", "GET"), request["path"])
         is_open = route[1] in OPEN_PATHS or route[1].startswith(ASSETS)
+        request[MAY] = Scope.COMMAND
         if not self._access.needed or (route[0] in READS and is_open):
             return
         given = headers.getlist("authorization")
@@ -179,17 +190,22 @@ class Guard:
             given += _offered_tokens(headers)
         scope = self._access.scope_of(given[0]) if len(given) == 1 else None
         if scope is None:
-            raise Refusal(401, "a bearer token is needed")
-        if scope is not Scope.COMMAND and route not in REPORT_ROUTES:
+            wrong = "this is none of this service's tokens; look for a missing or an additional character"
+            raise Refusal(401, wrong if len(given) == 1 else "a bearer token is needed")
+        reports = scope is Scope.REPORT and route == ("POST", "/api/reports")
+        if scope is not Scope.COMMAND and route[0] not in READS and not reports:
             raise Refusal(403, f"a {scope.value} token does not open this; a command token does")
+        request[MAY] = scope
 
     def _check_rate(self, request: Request) -> None:
         """Reports, reading the state, the page's parts and tiles, commands and other reading each have a bucket."""
         reads, path = request.get("method", "GET") in READS, request["path"]
-        frequent = path in ("/api/reports", "/api/state")
-        small = path.startswith((ASSETS, "/tiles/"))
+        past = request["query_string"] != b""  # a moment of history costs more than the present
+        frequent = path == "/api/reports" or (path == "/api/state" and not past)
+        small = path.startswith((ASSETS, "/tiles/", "/api/pictures/")) or path == "/api/written"
         per_s = self._http.reports_per_s if frequent or small else self._http.commands_per_s
-        wait = self._buckets.take((client_of(request), reads, frequent, small), per_s, self._now())
+        orders = path == ORDERS  # have a bucket of their own: what else is posted does not empty it
+        wait = self._buckets.take((client_of(request), reads, orders, frequent, small), per_s, self._now())
         if wait:
             raise too_many(per_s, wait)
 
@@ -231,6 +247,38 @@ class Guard:
                     left -= len((await incoming.receive()).get("body", b""))
 
 
+class Slots:
+    """How many requests of a kind may be under way at a time, and how many of them of one address. Orders have slots of
+    their own: however many reports are on their way in and maps on their way out, an order is not refused for them."""
+
+    MOST_OF_ONE: ClassVar[Mapping[str, int]] = {"maps": 4}
+    MOST: ClassVar[Mapping[str, int]] = {"orders": 32, "reports": 64, "maps": 8, "others": 64}
+    MAPS = frozenset({"/api/map", "/api/map.png"})
+
+    def __init__(self) -> None:
+        self._taken: Counter[str | tuple[str, str]] = Counter()
+
+    @contextlib.contextmanager
+    def taken(self, request: Request) -> Iterator[None]:
+        """Hold a slot while a request is answered; raises Refusal when there is none left."""
+        kind = self._kind(request["path"])
+        of_one, most_of_one = (kind, client_of(request)), self.MOST_OF_ONE.get(kind, self.MOST[kind])
+        if self._taken[kind] >= self.MOST[kind]:
+            raise Refusal(503, f"{self.MOST[kind]} such requests are under way already; try again", 1.0)
+        if self._taken[of_one] >= most_of_one:
+            raise Refusal(503, f"{most_of_one} such requests of yours are under way already; try again", 1.0)
+        self._taken += Counter((kind, of_one))
+        try:
+            yield
+        finally:
+            self._taken -= Counter((kind, of_one))
+
+    def _kind(self, path: str) -> str:
+        if path in self.MAPS:
+            return "maps"
+        return {ORDERS: "orders", "/api/reports": "reports"}.get(path, "others")
+
+
 class _Incoming:
     """The messages of a request, and whether its last one has come."""
 
@@ -242,6 +290,15 @@ class _Incoming:
         message = await self._receive()
         self.ended = not message.get("more_body", False)
         return message
+
+
+def _pieces(message: Message) -> Iterator[Message]:
+    """A message with a long body as several with short ones."""
+    body, start = message.get("body", b""), 0
+    while len(body) - start > _PIECE_BYTES:
+        yield {**message, "body": body[start : start + _PIECE_BYTES], "more_body": True}
+        start += _PIECE_BYTES
+    yield {**message, "body": body[start:]} if start else message
 
 
 def _announces_body(headers: Headers) -> bool:
@@ -274,7 +331,7 @@ def too_many(per_s: float, wait_s: float) -> Refusal:
     return Refusal(429, f"more than {per_s:g} a second; try again in {wait_s:.1f} s", wait_s)
 
 
-def _local_address(request: Request) -> str | None:
+def local_address(request: Request) -> str | None:
     """The address that a request came to; IPv4's own also where it came to a socket of both."""
     server = request.get("server")
     if not server:

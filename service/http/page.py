@@ -11,6 +11,14 @@ from starlette.staticfiles import StaticFiles
 FOLDER = Path(__file__).parents[1] / "page"
 
 
+PICTURE_HEADERS = {
+    "content-security-policy": "default-src 'none'; sandbox",
+    "content-disposition": "inline",
+    "cache-control": "private, max-age=86400, immutable",
+}
+"""A stranger's picture is shown and nothing else: whatever is in it, no browser runs it."""
+
+
 class Parts(StaticFiles):
     """The page's files; a browser keeps them, and asks each time whether they are still the same."""
 

@@ -1,60 +1,80 @@
-"""What the door shows of a run, live or replayed."""
+"""What the door shows of a run, live or replayed. All of it may have to be asked for elsewhere, so all of it waits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from prometheus_client import CollectorRegistry
 
-from service.evidence.reports import Receipt, Report
+from service.evidence.reports import OrderReceipt, Receipt, Report
+from service.geometry import LatLon
+from service.news.request import NewsRequest
 from service.view.feed import Moment
+from service.view.state import HeardState, RunState
 
 
-class Run(Protocol):
-    """A run as the door needs it."""
+class Unanswered(Exception):
+    """The flight does not answer: it stands still, or it is ending. What was asked may or may not have been done."""
 
-    registry: CollectorRegistry
 
-    def state(self) -> dict[str, Any]:
+class Sight(Protocol):
+    """A run at one time."""
+
+    async def state(self) -> RunState:
         """Where the search stands."""
         ...
 
-    def map(self) -> dict[str, Any]:
-        """Belief and POD, cell by cell."""
+    async def map(self) -> bytes:
+        """Belief and POD, cell by cell, as JSON."""
         ...
 
-    def geojson(self) -> dict[str, Any]:
+    async def geojson(self) -> bytes:
         """The map as RFC 7946."""
         ...
 
-    def picture(self) -> Callable[[], bytes]:
-        """What draws the map as it is now, as a PNG."""
+    async def picture(self) -> bytes:
+        """The map as a PNG."""
         ...
 
-    def decisions(self, count: int) -> list[dict[str, Any]]:
+    async def decisions(self, count: int) -> list[dict[str, Any]]:
         """The last decisions, the newest first."""
         ...
 
+    async def moment(self) -> Moment:
+        """What there is to see."""
+        ...
+
+    async def regions(self) -> dict[str, Any]:
+        """The regions as they are drawn at that time, for the page."""
+        ...
+
+
+class Run(Sight, Protocol):
+    """A run as the door needs it."""
+
     def scene(self) -> dict[str, Any]:
-        """What does not change during the run."""
+        """What a page needs at first."""
+        ...
+
+    def written(self, place: LatLon) -> str:
+        """A place (latitude, longitude) as the team writes places."""
+        ...
+
+    async def kept_picture(self, name: str) -> bytes | None:
+        """A JPEG that came with a report, by its name; None when there is none of that name."""
         ...
 
     def searchable(self) -> NDArray[np.bool_]:
         """The cells that are searched, [rows, cols]."""
         ...
 
-    def moment(self) -> Moment:
-        """What there is to see now."""
+    async def metrics(self) -> bytes:
+        """What Prometheus is told."""
         ...
 
-    async def moment_at(self, at: float) -> Moment:
-        """What there was to see at a time, in seconds since the epoch; a live run only knows now."""
-        ...
-
-    def ready(self) -> bool:
+    async def ready(self) -> bool:
         """True while a search can take reports."""
         ...
 
@@ -62,8 +82,22 @@ class Run(Protocol):
         """Detector reports."""
         ...
 
-    async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
-        """An operator's order; the state after it."""
+    async def order(
+        self,
+        command: str,
+        place: tuple[float, float] | None = None,
+        aircraft: str | None = None,
+        system_id: int | None = None,
+    ) -> OrderReceipt:
+        """An operator's order, to one aircraft or all; what became of it. Raises BadInput."""
+        ...
+
+    async def hear(self, request: NewsRequest) -> HeardState:
+        """News from the field. Raises BadInput."""
+        ...
+
+    async def withdraw(self, name: str) -> HeardState:
+        """News are taken back. Raises BadInput."""
         ...
 
 
@@ -74,6 +108,6 @@ class PastRun(Run, Protocol):
         """Its first and last time, seconds since the epoch."""
         ...
 
-    def at(self, time: float) -> Run:
+    def at(self, time: float) -> Sight:
         """The run as it was at a time."""
         ...

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import h11
 import uvicorn
@@ -17,14 +19,16 @@ from service.config import HttpSettings, PageSettings
 from service.http.access import Access, read_access
 from service.http.address import bind, bound_address, split_address, url_of
 from service.http.app import create_app
+from service.http.crowd import Crowd
 from service.http.run import PastRun, Run
 from service.view.underlay import NO_UNDERLAY, Underlay, open_underlay
 
-_MOST_CONNECTIONS = 256
 _MOST_HEADER_BYTES = 16_384
+_READ_BYTES = 16_384
 _KEEP_ALIVE_S = 15
 _SHUTDOWN_S = 2
 _PING_S = 10.0
+_LEAST_BYTES_PER_S = 8_192  # 64 kbit/s
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,13 @@ class Door:
         """A URL by which this machine itself reaches the door."""
         return url_of(self.listener)
 
+    @property
+    def address(self) -> str:
+        """Where it listens, for a person to read; the URL comes first."""
+        bound = bound_address(self.listener)
+        everywhere = f" and at every other address of this machine ({bound})" if bound.is_unspecified else ""
+        return f"{self.url}{everywhere}"
+
     def with_guest(self) -> tuple[Door, str]:
         """This door with one more report token, and that token (empty where none is needed)."""
         access, token = self.access.with_guest()
@@ -48,16 +59,17 @@ class Door:
 
     def server(self, run: Run, past: PastRun | None = None) -> Server:
         """A server of a run at this door; for `past` see `create_app`."""
+        return self.serving(lambda **known: create_app(run, http=self.http, past=past, **known))
+
+    def serving(self, create: Callable[..., FastAPI]) -> Server:
+        """A server of the application that `create` makes, of who may enter here and by which names it is called."""
         address = bound_address(self.listener)
         name = split_address(self.http.listen)[0]
-        app = create_app(
-            run,
-            http=self.http,
+        app = create(
             access=self.access,
             names=() if address.is_unspecified else (name if ":" not in name else f"[{name}]", f"{address}"),
             any_address=address.is_unspecified,
             underlay=self.underlay,
-            past=past,
         )
         return Server(app, self.listener, self.http)
 
@@ -84,26 +96,85 @@ def open_door(http: HttpSettings, environment: Mapping[str, str], page: PageSett
 
 
 class Impatient(H11Protocol):
-    """uvicorn's protocol that also hangs up on who does not come to the end of a request's headers."""
+    """uvicorn's protocol that also hangs up on who does not come to the end of a request's headers or hardly reads an
+    answer, keeps to a crowd, and reads little at a time, so that whoever sends much takes turns with the others."""
 
     patience_s = 5.0
+    reading_s: ClassVar[float] = 5.0
+    """Over so long it is looked at how fast an answer is read."""
+    _reading: asyncio.TimerHandle | None = None
+    crowd = Crowd()
+    _address = ""
     _hang_up: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """A client has connected."""
         super().connection_made(transport)
+        transport.max_size = _READ_BYTES  # type: ignore[attr-defined]  # of asyncio's transport; a WebSocket keeps it
+        self._address = str(self.client[0]) if self.client else ""
+        self.crowd.enter(self, self._address)
         self._watch()
 
     def data_received(self, data: bytes) -> None:
         """Some bytes of a request."""
+        self.crowd.heard(self, self._address)
         super().data_received(data)
         self._watch()
+
+    def pause_writing(self) -> None:
+        """Much of an answer waits to be read."""
+        super().pause_writing()
+        self._look_on(self.transport.get_write_buffer_size())
+
+    def resume_writing(self) -> None:
+        """It has been read."""
+        super().resume_writing()
+        self._look_away()
+
+    def _look_on(self, waiting: int) -> None:
+        self._reading = self.loop.call_later(self.reading_s, self._look_again, waiting)
+
+    def _look_again(self, before: int) -> None:
+        waiting = self.transport.get_write_buffer_size()
+        if before - waiting < self.reading_s * _LEAST_BYTES_PER_S:
+            self.transport.abort()  # which also forgets what waits
+        else:
+            self._look_on(waiting)
+
+    def _look_away(self) -> None:
+        if self._reading is not None:
+            self._reading.cancel()
+            self._reading = None
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        """The connection is a WebSocket's from now on."""
+        self._look_away()
+        self._leave()
+        super().handle_websocket_upgrade(event)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """The client is gone."""
         super().connection_lost(exc)
+        self._look_away()
+        self._leave()
+
+    def idle(self) -> bool:
+        """True while no request is being answered."""
+        return self.cycle is None or self.cycle.response_complete
+
+    def asked(self) -> bool:
+        """True once the headers of a request were all there."""
+        return self.cycle is not None
+
+    def hang_up(self) -> None:
+        """Make room for others."""
+        self.transport.abort()
+
+    def _leave(self) -> None:
+        self.crowd.leave(self, self._address)
         if self._hang_up is not None:
             self._hang_up.cancel()
+            self._hang_up = None
 
     def _watch(self) -> None:
         waiting = self.conn.their_state is h11.IDLE
@@ -115,23 +186,24 @@ class Impatient(H11Protocol):
 
 
 class Server(uvicorn.Server):
-    """uvicorn on our socket, leaving signals to the service."""
+    """uvicorn on our socket, leaving signals and words to the service."""
 
     def __init__(self, app: FastAPI, listener: socket.socket, http: HttpSettings | None = None) -> None:
         patience_s = (http or HttpSettings()).body_timeout_s
+        # what uvicorn says is about strangers' mistakes; what goes wrong in the application, that says itself
+        logging.getLogger("uvicorn").setLevel(logging.CRITICAL + 1)
         config = uvicorn.Config(
             app,
-            http=type("Impatient", (Impatient,), {"patience_s": patience_s}),
+            http=type("Impatient", (Impatient,), {"patience_s": patience_s, "crowd": Crowd()}),
             ws="websockets-sansio",
             ws_max_size=_MOST_HEADER_BYTES,  # all that a watcher ever says is a time to look at
             ws_ping_interval=_PING_S,
             ws_ping_timeout=_PING_S,
             lifespan="off",
-            log_level="warning",
+            log_config=None,
             access_log=False,  # a path may hold anything that somebody pasted into it
             proxy_headers=False,  # who asks is who is connected, not who a header says
             server_header=False,
-            limit_concurrency=_MOST_CONNECTIONS,
             timeout_keep_alive=_KEEP_ALIVE_S,
             timeout_graceful_shutdown=_SHUTDOWN_S,
             h11_max_incomplete_event_size=_MOST_HEADER_BYTES,

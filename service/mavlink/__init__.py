@@ -6,25 +6,28 @@ ArduPilot).
 """
 
 from service.mavlink.errors import CommandFailed, LinkError, NotPermitted, NoVehicle
-from service.mavlink.history import Pose, PoseHistory
+from service.mavlink.events import Home
+from service.mavlink.history import PastPose, PoseHistory
 from service.mavlink.modes import ModeKind
-from service.mavlink.settings import LinkSettings
+from service.mavlink.settings import MavlinkSettings
 from service.mavlink.signing import read_signing_key
-from service.mavlink.telemetry import Home, Telemetry, Wind
+from service.mavlink.telemetry import Telemetry, Wind
+from service.mavlink.url import check_link
 from service.mavlink.vehicle import Vehicle
 
 __all__ = [
     "CommandFailed",
     "Home",
     "LinkError",
-    "LinkSettings",
+    "MavlinkSettings",
     "ModeKind",
     "NoVehicle",
     "NotPermitted",
-    "Pose",
+    "PastPose",
     "PoseHistory",
     "Telemetry",
     "Vehicle",
     "Wind",
+    "check_link",
     "read_signing_key",
 ]

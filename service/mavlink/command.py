@@ -45,6 +45,8 @@ class Command:
     label: str = ""
     height_m: float | None = None
     """Of a take-off: how far it climbs above home."""
+    speed_mps: float | None = None
+    """Of a change of speed."""
 
     @property
     def name(self) -> str:
@@ -123,6 +125,10 @@ class CommandBook:
         self._lanes: dict[int, _Lane] = {}
         self._next_ticket = 1
 
+    def number_after(self, other: CommandBook) -> None:
+        """Go on with the tickets of another book, so that none of its has a namesake here."""
+        self._next_ticket = other._next_ticket
+
     def submit(self, command: Command, now: float) -> int:
         """Send a command as soon as its number is free; returns the ticket of its CommandDone."""
         ticket = self._next_ticket
@@ -189,6 +195,15 @@ class CommandBook:
             if lane.active is not None and not (only_motion and not lane.active.command.motion):
                 done += self._end(lane, Cancelled(reason), now)
         return done
+
+    def end(self, number: int, reason: str, now: float) -> list[CommandDone]:
+        """End the commands of one number; nothing of them is sent again."""
+        lane = self._lanes.get(number)
+        if lane is None:
+            return []
+        done = self._closed(lane.waiting, Cancelled(reason), now)
+        lane.waiting.clear()
+        return done + (self._end(lane, Cancelled(reason), now) if lane.active is not None else [])
 
     def _start(self, lane: _Lane, now: float) -> None:
         if lane.active is not None or not lane.waiting or now < lane.rests_until:

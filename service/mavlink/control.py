@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 
 from service.mavlink.autopilots.base import Autopilot
+from service.mavlink.modes import mode_title
 from service.mavlink.telemetry import Telemetry
 
 _CLIMB_SHARE = 0.1
@@ -78,7 +79,7 @@ class Control:
             self._expected.clear()
             self._commanded_mode = mode
         else:
-            self.lose(f"the mode was changed to {mode} and not by us")
+            self.lose(f"the mode was changed to {mode_title(mode)} and not by us")
         return commanded
 
     def on_armed(self, armed: bool, now: float) -> bool:

@@ -15,7 +15,6 @@ What moves the aircraft passes one of two gates, right before it is sent:
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Hashable
 from dataclasses import replace
 
@@ -24,100 +23,49 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.mavlink import gates
 from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.autopilots.registry import autopilot_for
-from service.mavlink.boot import BootClock
-from service.mavlink.command import Command, CommandBook, result_name, set_message_interval
-from service.mavlink.control import Control
+from service.mavlink.command import Command, result_name, set_message_interval
 from service.mavlink.errors import NotPermitted
 from service.mavlink.events import (
+    AnotherService,
     ArmedChanged,
-    CommandDone,
     LandedChanged,
     LinkBack,
     LinkLost,
     ModeChanged,
+    Notice,
     Paired,
     Rebooted,
-    Refused,
     Stalled,
     StatusText,
     Target,
-    TargetNotTaken,
     TargetReplaced,
     TargetTaken,
     VehicleEvent,
 )
-from service.mavlink.framing import Codec, Message, Receiver, own_heartbeat
-from service.mavlink.history import PoseHistory
-from service.mavlink.quality import LinkQuality
-from service.mavlink.readiness import Readiness
-from service.mavlink.settings import LinkSettings
-from service.mavlink.signing import Signer
-from service.mavlink.streams import Streams, common_streams
-from service.mavlink.target import Step, TargetWatch
-from service.mavlink.telemetry import READERS, Telemetry, after_reboot, heartbeat, stopping_point
-from service.mavlink.texts import TextReader, text_messages
+from service.mavlink.framing import Message, own_heartbeat
+from service.mavlink.modes import mode_title
+from service.mavlink.state import LinkState, speaks_as
+from service.mavlink.streams import Streams, streams_of
+from service.mavlink.target import Step
+from service.mavlink.telemetry import after_reboot, heartbeat, stopping_point
+from service.mavlink.texts import text_messages
 
 _AUTOPILOT = mavlink.MAV_COMP_ID_AUTOPILOT1
-_BEFORE_PAIRING_SYSTEM = 1
-_TEXT_MEMORY_S = 10.0
+_V2_START = b"\xfd"
 _ARMS = (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF)
 
 
-class LinkCore:
-    """One link to one vehicle.
-
-    Args:
-        settings: rates, limits and time-outs.
-        speaks_first: whether to send heartbeats before a vehicle was heard, so that the peer learns our
-            address (a `udpout` link). Where we only listen, nothing is sent to anybody before that.
-    """
-
-    def __init__(self, settings: LinkSettings, *, speaks_first: bool = False) -> None:
-        self.settings = settings
-        self.autopilot: Autopilot | None = None
-        self.telemetry = Telemetry()
-        self.history = PoseHistory(settings.history_s)
-        self.destination: Hashable = None
-        """The source the vehicle is heard from; None before that."""
-        self.rejected = ""
-        """Why the last autopilot heard was not paired with, as a sentence's end."""
-        self.bytes_received = 0
-        self.messages_received = 0
-        self.quality = LinkQuality()
-        self._speaks_first = speaks_first
-        signer = Signer(settings.signing_key) if settings.signing_key is not None else None
-        self.codec = Codec(settings.system_id or _BEFORE_PAIRING_SYSTEM, settings.component_id, signer)
-        self._receiver = Receiver(self.codec)
-        self._boot = BootClock()
-        self._streams = Streams(())
-        self._book = CommandBook(
-            self._transmit,
-            ack_timeout_s=settings.ack_timeout_s,
-            attempts=settings.command_attempts,
-            in_progress_timeout_s=settings.in_progress_timeout_s,
-        )
-        self._watch = TargetWatch(
-            timeout_s=settings.target_timeout_s,
-            attempts=settings.target_attempts,
-            tolerance_m=settings.target_tolerance_m,
-        )
-        self._control = Control()
-        self._texts = TextReader()
-        self._recent_texts: deque[StatusText] = deque(maxlen=20)
-        self._outgoing: list[bytes] = []
-        self._events: list[VehicleEvent] = []
-        self._now: float | None = None
-        self._stalled_at = -math.inf
-        self._heard_at = -math.inf
-        self._beat_at = -math.inf
-        self._readiness = Readiness(settings)
-        self._text_id = 0
+class LinkCore(LinkState):
+    """One link to one vehicle: see `state.LinkState` for its arguments and for what it remembers."""
 
     # ---- what the owner calls
 
     def receive_data(self, data: bytes, now: float, source: Hashable = None) -> list[VehicleEvent]:
         """Take bytes that arrived from a source (None where there is only one). Never raises."""
         self._wake(now)
+        if self.paired and source != self.destination and now - self._last_heard <= self.settings.link_lost_s:
+            self.datagrams_dropped += 1  # not the vehicle's, and that is heard: not even looked at
+            return self._pop_events()
         self.bytes_received += len(data)
         for message in self._receiver.feed(data, now, source):
             self._take(message, source, now)
@@ -132,8 +80,11 @@ class LinkCore:
             self._beat_at = now
             self._send(own_heartbeat())
         if self.paired:
+            self.codec.speaks_v1 = self._hearing.wants_v1(now) or self.codec.speaks_v1
             self._check_silence(now)
             self._ask_for_streams(now)
+            self._ask_for_parameters(now)
+            self._ask_for_reposition(now)
             self._book.motion_waits = self.why_not_command(now, ordered=True) is not None
             self._done(self._book.tick(now))
             self._push_target(now)
@@ -141,50 +92,22 @@ class LinkCore:
             self._judge_readiness(now)
         return self._pop_events()
 
-    def data_to_send(self) -> list[bytes]:
-        """The frames to send now, in order, each to be one datagram; they are handed out once."""
-        frames, self._outgoing = self._outgoing, []
-        return frames
+    def forget(self, system_id: int | None, now: float) -> tuple[LinkCore, list[VehicleEvent]]:
+        """On an operator's order: another aircraft is to come on this link, the next that is heard or, with a system
+        id, that one alone.
 
-    @property
-    def paired(self) -> bool:
-        """Whether a vehicle that can be flown has been heard."""
-        return self.autopilot is not None
-
-    @property
-    def in_control(self) -> bool:
-        """Whether the aircraft is ours to move."""
-        return self._control.held
-
-    @property
-    def target(self) -> Target | None:
-        """The last target sent, unless it was given up."""
-        return self._watch.target
-
-    def recent_texts(self, since: float) -> list[StatusText]:
-        """What the vehicle has said since then (the last 20 at most)."""
-        return [text for text in self._recent_texts if text.time >= since]
-
-    # ---- the gates
-
-    def why_not_command(self, now: float, *, ordered: bool = False) -> str | None:
-        """Why nothing that moves the aircraft may be sent now, or None; `ordered` by an operator just now."""
-        return gates.why_not_command(
-            self.autopilot,
-            self.telemetry,
-            self.settings,
-            now=now,
-            stalled_at=self._stalled_at,
-            ordered=ordered,
-        )
-
-    def why_not_reposition(self, now: float) -> str | None:
-        """Why no target may be sent now, or None."""
-        reason = self.why_not_command(now)
-        if reason is not None or self.autopilot is None:
-            return reason
-        t = self.telemetry
-        return gates.why_not_guided(self.autopilot, t) or gates.why_not_flying(t, self.settings, now=now)
+        Returns the core that waits for it, and what ends with this one, which is not to be used any more. All that was
+        known of the vehicle is new in it because it is another core: kind, parameters, home, battery, clocks, past,
+        what it answers to. Only what is ours goes on.
+        """
+        self._wake(now)
+        self.release_control("another aircraft is waited for", now)
+        self._done(self._book.cancel("another aircraft is waited for", now))
+        settings = replace(self.settings, system_id=system_id)
+        self.codec.forget_vehicle(speaks_as(settings))
+        core = LinkCore(settings, speaks_first=self._speaks_first, codec=self.codec)
+        core._go_on_from(self)
+        return core, self._pop_events()
 
     # ---- what moves the aircraft
 
@@ -201,6 +124,10 @@ class LinkCore:
         if reason is not None:
             raise NotPermitted(f"cannot take control: {reason}")
         self._control.take(self.telemetry.mode)
+        self._strangers.start_over()
+        self._cruise.start_over()
+        if self.autopilot is not None and self.autopilot.take_over_advice:
+            self.status_text(self.autopilot.take_over_advice, mavlink.MAV_SEVERITY_WARNING)
         self._show_control()
 
     def release_control(self, reason: str, now: float) -> None:
@@ -224,14 +151,18 @@ class LinkCore:
         self._wake(now)
         target = Target(lat, lon, alt_amsl_m)
         reason = self.why_not_reposition(now) or gates.why_not_there(self.telemetry, self.settings, target)
+        if reason is None and self._strangers.suspect is not None:
+            reason = "somebody else may just have given the aircraft a target"
         if reason is not None:
             raise NotPermitted(f"no waypoint was sent: {reason}")
-        self._send_target(target)
+        self._book.end(mavlink.MAV_CMD_DO_REPOSITION, "a waypoint follows", now)
+        self._send_target(target, now)
         self._watch.start(target, now)
         return target
 
-    def hold(self, now: float) -> Target:
-        """Stop here, in the guided mode: at the place where the aircraft can just stop, not behind it.
+    def hold(self, now: float, least_amsl_m: float = math.nan) -> Target:
+        """Stop here, in the guided mode: at the place where the aircraft can just stop, not behind it, and at the
+        present altitude, or at the least that it may have (NaN: any).
 
         Raises:
             NotPermitted: as for `reposition`.
@@ -240,7 +171,26 @@ class LinkCore:
         if autopilot is None or not t.position_known:
             raise NotPermitted("no waypoint was sent: the position of the aircraft is not known")
         stop = stopping_point(t, autopilot.stopping_distance_m(t.ground_speed_mps))
-        return self.reposition(stop.lat, stop.lon, stop.alt_amsl_m, now)
+        altitude = max(stop.alt_amsl_m, least_amsl_m) if math.isfinite(least_amsl_m) else stop.alt_amsl_m
+        return self.reposition(stop.lat, stop.lon, altitude, now)
+
+    def brake(self, now: float) -> int:
+        """Stop where it can, without a position of ours: the autopilot's own way. Returns the command's ticket.
+
+        Raises:
+            NotPermitted: it is not ours to move now, or not flying to our waypoints. Nothing was sent.
+        """
+        reason = self.why_not_command(now)
+        if reason is None and self.autopilot is not None:
+            reason = gates.why_not_guided(self.autopilot, self.telemetry)
+        if reason is None and not self.telemetry.armed:
+            reason = "the aircraft is not armed"
+        if reason is not None or self.autopilot is None:
+            raise NotPermitted(f"no stop was sent: {reason}")
+        self._watch.clear()
+        self._strangers.start_over()
+        self._brake = self.request(self.autopilot.brake(), now)
+        return self._brake
 
     def request(self, command: Command, now: float, *, ordered: bool = False) -> int:
         """Send a command; returns the ticket of its CommandDone.
@@ -252,6 +202,8 @@ class LinkCore:
         self._wake(now)
         if command.number in _ARMS and not self.settings.allow_arming:
             raise NotPermitted("this service was not allowed to arm or take off")
+        if command.speed_mps is not None:  # refused, it is still wanted: sent with the next waypoint
+            self._cruise.want(command.speed_mps)
         reason = self.why_not_command(now, ordered=ordered or not command.motion)
         if reason is not None:
             raise NotPermitted(f"{command.name} was not sent: {reason}")
@@ -273,20 +225,24 @@ class LinkCore:
         self.messages_received += 1
         name = message.get_type()
         if message.get_srcComponent() != _AUTOPILOT or name == "RADIO_STATUS":
+            self._heard_other(message, now)
             return  # a radio's word is never the autopilot's: it needs no signature
         if not self.paired:
             if name == "HEARTBEAT":
                 self._pair(message, source, now)
             return
         if message.get_srcSystem() != self.telemetry.system_id:
+            self._heard_in_its_place(message, now)
             return
         if source != self.destination:
-            if now - self._heard_at <= self.settings.link_lost_s:
+            if now - self._last_heard <= self.settings.link_lost_s:
                 return  # somebody else speaks in the vehicle's name while it is still heard
-            self.destination = source
-        self._heard_at = now
+            was, self.destination = self.destination, source
+            self._events.append(Notice(now, f"the autopilot is heard from {source} now, and not from {was}"))
+        self._last_heard = now
         self.quality.note(message.get_seq())
-        if self._boot.read(message):
+        self._hearing.on_message(v2=message.get_msgbuf()[:1] == _V2_START)
+        if self._boot.read(message, now):
             self._rebooted(now)
         self._streams.on_message(message.get_msgId(), now)
         if name == "HEARTBEAT":
@@ -295,8 +251,35 @@ class LinkCore:
             self._ack(message, now)
         elif name == "STATUSTEXT":
             self._heard_texts(self._texts.read(message, now), now)
-        elif name in READERS:
+        elif name == "PARAM_VALUE":
+            told = self._parameters.read(message.param_id.rstrip("\0"), message.param_value)
+            if told is not None:
+                self._heard.base = replace(self._heard.base, **dict([told]))  # type: ignore[arg-type]
+        else:
             self._read(name, message, now)
+
+    def _heard_in_its_place(self, message: Message, now: float) -> None:
+        """Another autopilot, while ours is silent on the ground: whoever has exchanged the aircraft has to say so."""
+        kept = self.settings.system_id not in (None, message.get_srcSystem())
+        if message.get_type() != "HEARTBEAT" or kept or self.telemetry.armed or not self.telemetry.link_lost:
+            return
+        other = autopilot_for(message.autopilot, message.type)
+        if isinstance(other, str) or (message.get_srcSystem(), other.name) in self._told_of:
+            return
+        self._told_of.add((message.get_srcSystem(), other.name))
+        who = f"system {message.get_srcSystem()} ({other.title})"
+        said = f"{who} is heard, and not the aircraft that was there: if it is another one now, order replace"
+        self._events.append(Notice(now, said))
+
+    def _heard_other(self, message: Message, now: float) -> None:
+        us = (self.codec.system_id, self.codec.component_id)
+        speaks_as_us = (message.get_srcSystem(), message.get_srcComponent()) == us
+        if self.paired and speaks_as_us and message.get_type() == "HEARTBEAT":
+            self._tell_another(self._company.on_heartbeat(message, now), now)
+
+    def _tell_another(self, reason: str, now: float) -> None:
+        if reason:
+            self._events.append(AnotherService(now, reason))
 
     def _pair(self, message: Message, source: Hashable, now: float) -> None:
         system = message.get_srcSystem()
@@ -309,12 +292,13 @@ class LinkCore:
             return
         self.autopilot = autopilot
         self.destination = source
-        self._heard_at = now
+        self._last_heard = now
+        self._hearing.began(now)
         self.codec.system_id = system
-        self._streams = Streams((*common_streams(self.settings), *autopilot.extra_streams))
-        self.telemetry = t = heartbeat(
-            replace(self.telemetry, system_id=system, autopilot=autopilot.name), message, autopilot, now
-        )
+        self._streams = Streams(streams_of(self.settings, autopilot.name))
+        self._parameters = self._parameters_of(autopilot)
+        named = replace(self._heard.base, system_id=system, autopilot=autopilot.name)
+        self._heard.base = t = heartbeat(named, message, autopilot, now)
         self._events.append(Paired(now, system, autopilot.name, t.mode, t.armed))
 
     def _heartbeat(self, message: Message, now: float) -> None:
@@ -322,13 +306,18 @@ class LinkCore:
         assert autopilot is not None
         same = autopilot_for(message.autopilot, message.type)
         if isinstance(same, str) or same.name != autopilot.name:
+            self._heard_in_its_place(message, now)
             return
-        self.telemetry = after = heartbeat(before, message, autopilot, now)
+        self._heard.base = after = heartbeat(self._heard.base, message, autopilot, now)
         if before.link_lost:
             self._events.append(LinkBack(now, now - before.heartbeat_time))
             self._streams.start_over()
         if after.mode != before.mode:
             self._mode_changed(autopilot, before.mode, now)
+        elif self._control.held and autopilot.holds_by_failsafe(
+            after.mode, after.system_status, self._lately_said(now)
+        ):
+            self._failsafe_holds(autopilot, after.mode, now)
         self._done(self._book.on_mode(after.mode, now))
         self._done(self._book.on_armed(after.armed, now))
         if after.armed != before.armed:
@@ -341,55 +330,86 @@ class LinkCore:
     def _mode_changed(self, autopilot: Autopilot, previous: str, now: float) -> None:
         t = self.telemetry
         commanded = self._control.on_mode(autopilot, previous, t, now)
-        texts = [text.text for text in self.recent_texts(now - _TEXT_MEMORY_S)]
-        failsafe = not commanded and autopilot.looks_like_failsafe(t.mode, t.system_status, texts)
+        said = self._lately_said(now)
+        failsafe = not commanded and autopilot.looks_like_failsafe(t.mode, t.system_status, said)
         kind = autopilot.mode_kind(t.mode)
         self._events.append(ModeChanged(now, t.mode, previous, kind, t.guided, commanded, failsafe))
+        self._strangers.start_over()
+        self._cruise.start_over()
         if not commanded:
-            self._stand_down(f"the mode was changed to {t.mode} and not by us", now)
+            self._stand_down(f"the mode was changed to {mode_title(t.mode)} and not by us", now)
         elif not t.guided:
             self._watch.clear()
 
+    def _failsafe_holds(self, autopilot: Autopilot, mode: str, now: float) -> None:
+        """The mode is the one in which it follows us, and it is not for us that it is in it."""
+        self._control.lose("the autopilot's failsafe holds the aircraft")
+        self._stand_down("the autopilot's failsafe holds the aircraft", now)
+        kind = autopilot.mode_kind(mode)
+        self._events.append(ModeChanged(now, mode, mode, kind, True, commanded=False, failsafe=True))
+
     def _ack(self, message: Message, now: float) -> None:
-        ours = (message.target_system, message.target_component)
-        if ours not in (
-            (0, 0),
-            (self.codec.system_id, 0),
-            (self.codec.system_id, self.codec.component_id),
-        ):
+        named = (message.target_system, message.target_component)
+        us = (self.codec.system_id, self.codec.component_id)
+        reason = self._company.on_ack(message, ours=named == us, now=now) if named[1] else ""
+        self._tell_another(reason, now)
+        if named not in ((0, 0), (us[0], 0), us):
             return
+        self._hearing.on_answer()
         if message.command == mavlink.MAV_CMD_DO_REPOSITION:
             assert self.autopilot is not None
+            self._probe.on_answer(message.result)
             if self.autopilot.refuses_reposition(message.result):
                 self._watch.on_refusal(result_name(message.result))
             return
         self._done(self._book.on_ack(message.command, message.result, now))
 
     def _read(self, name: str, message: Message, now: float) -> None:
-        before = self.telemetry
-        after = replace(READERS[name](before, message, now), boot_time_s=self._boot.seconds)
-        self.telemetry = after
+        self._heard.boot_s = self._boot.seconds
+        landed = self.telemetry.landed_state if name == "EXTENDED_SYS_STATE" else ""
+        sea_m = self._heard.sea_m
+        if not self._heard.take(message, now):
+            return
+        if self._heard.sea_m != sea_m:
+            self._sea_moved(self._heard.sea_m - sea_m, now)
+        if (moved := self._references.read(self.telemetry, name, now)) is not None:
+            self._events.append(moved)
         if name == "GLOBAL_POSITION_INT":
-            if after.position_time == now:
-                self.history.record(after)
-        elif name == "EXTENDED_SYS_STATE" and after.landed_state != before.landed_state:
-            self._events.append(LandedChanged(now, after.landed_state, before.landed_state))
+            self.history.record(self.telemetry)
+            self._judge_speed(now)
+        elif name == "EXTENDED_SYS_STATE" and self.telemetry.landed_state != landed:
+            self._events.append(LandedChanged(now, self.telemetry.landed_state, landed))
         elif name == "SYS_STATUS":
-            self._readiness.on_status(after.prearm_ok, now)
+            self._readiness.on_status(self.telemetry.prearm_ok, now)
             self._judge_readiness(now)
         elif name == "POSITION_TARGET_GLOBAL_INT":
-            self._named(after.target, now)
+            self._named(self.telemetry.target_amsl, now)
+
+    def _sea_moved(self, by_m: float, now: float) -> None:
+        """Altitudes were corrected: a target of ours may have another name now, and is not repeated by its old one."""
+        self._strangers.sea_moved(by_m)
+        if not self._watch.taken:
+            self._give_up_target("sea level has moved", now)
 
     def _named(self, named: Target | None, now: float) -> None:
         target = self._watch.target
-        taken_after, stranger = self._watch.on_named(named, now)
-        if target is None:
-            return
-        if taken_after is not None:
+        taken_after = self._watch.on_named(named, now)
+        if target is not None and taken_after is not None:
             self._events.append(TargetTaken(now, target, taken_after))
+            self._send_speed(self._cruise.on_taken(), now)
+        t = self.telemetry
+        if named is None or not (t.in_control and t.guided and t.armed and t.landed_state == "in_air"):
+            self._strangers.start_over()
+            return
+        stranger = self._strangers.on_named(named, now)
         if stranger is not None:
+            failsafe = any("failsafe" in text.lower() for text in self._lately_said(now))
+            by = "the autopilot's failsafe" if failsafe else self._company.commander(now)
             self._watch.clear()
-            self._events.append(TargetReplaced(now, target, stranger))
+            self._control.lose(f"{by} has given the aircraft another target")
+            self._stand_down("the aircraft was given another target", now)
+            self._strangers.start_over()
+            self._events.append(TargetReplaced(now, target, stranger, by))
 
     def _heard_texts(self, texts: list[StatusText], now: float) -> None:
         for text in texts:
@@ -403,9 +423,12 @@ class LinkCore:
         self._stand_down("the vehicle has rebooted", now)
         self._done(self._book.cancel("the vehicle has rebooted", now))
         self._streams.start_over()
-        self.history.clear()
+        self.history.forget_boot()
         self._readiness.forget()
-        self.telemetry = after_reboot(self.telemetry)
+        self._references.forget()
+        if self.autopilot is not None:
+            self._parameters = self._parameters_of(self.autopilot)
+        self._heard.forget(after_reboot(self.telemetry))
         self._events.append(Rebooted(now))
 
     # ---- what is due by time
@@ -422,7 +445,7 @@ class LinkCore:
         silent_s = now - self.telemetry.heartbeat_time
         if self.telemetry.link_lost or silent_s <= self.settings.link_lost_s:
             return
-        self.telemetry = replace(self.telemetry, link_lost=True)
+        self._heard.base = replace(self._heard.base, link_lost=True)
         self._events.append(LinkLost(now, silent_s))
         self._stop_repeating("the link was lost", now)
         self._done(self._book.cancel("the link was lost", now))
@@ -435,13 +458,18 @@ class LinkCore:
                 self._book.submit(set_message_interval(stream.message_id, stream.hz), now), stream
             )
 
+    def _ask_for_parameters(self, now: float) -> None:
+        for name in [] if self.telemetry.link_lost else self._parameters.due(now):
+            system, word = self.telemetry.system_id, name.encode().ljust(16, b"\0")
+            self._send(mavlink.MAVLink_param_request_read_message(system, _AUTOPILOT, word, -1))
+
     def _push_target(self, now: float) -> None:
         step, target = self._watch.due(now), self._watch.target
-        if step is None or target is None:
-            return
+        if step is None or target is None or self._strangers.suspect is not None:
+            return  # who may just have given it another is not overridden by a repetition either
         reason = self.why_not_reposition(now)
         if step is Step.RESEND and reason is None:
-            self._send_target(target)
+            self._send_target(target, now)
             self._watch.sent_again(now)
             return
         refusal = self._watch.refusal
@@ -450,58 +478,15 @@ class LinkCore:
         )
         self._give_up_target(reason or answer, now)
 
+    def _judge_speed(self, now: float) -> None:
+        t = self.telemetry
+        if t.in_control and t.guided and self._watch.taken:
+            again, said = self._cruise.on_speed(t.ground_speed_mps, now, climb_mps=t.velocity_ned_mps[2])
+            self._send_speed(again, now)
+            if said:
+                self._events.append(Notice(now, said))
+
     def _judge_readiness(self, now: float) -> None:
         ready = self._readiness.ready(self.telemetry, now)
         if ready != self.telemetry.ready_to_arm:
-            self.telemetry = replace(self.telemetry, ready_to_arm=ready)
-
-    # ---- helpers
-
-    def _send_target(self, target: Target) -> None:
-        assert self.autopilot is not None
-        self._send(self.autopilot.reposition(target, self.telemetry.system_id, _AUTOPILOT))
-
-    def _give_up_target(self, reason: str, now: float) -> None:
-        target, attempts = self._watch.target, self._watch.attempts
-        if target is not None and not self._watch.taken:
-            self._events.append(TargetNotTaken(now, target, attempts, reason))
-        self._watch.clear()
-
-    def _stop_repeating(self, reason: str, now: float) -> None:
-        self._done(self._book.cancel(reason, now, only_motion=True))
-        if not self._watch.taken:
-            self._give_up_target(reason, now)
-
-    def _stand_down(self, reason: str, now: float) -> None:
-        """Control is lost: nothing that was under way is sent again."""
-        self._done(self._book.cancel(reason, now, only_motion=True))
-        self._give_up_target(reason, now)
-        self._show_control()
-
-    def _show_control(self) -> None:
-        held, reason = self._control.held, self._control.reason
-        if (self.telemetry.in_control, self.telemetry.control_reason) != (held, reason):
-            self.telemetry = replace(self.telemetry, in_control=held, control_reason=reason)
-
-    def _transmit(self, command: Command, confirmation: int) -> None:
-        now = self._now
-        assert now is not None
-        if command.goal_mode is not None:
-            self._control.expect(command.goal_mode, now + self.settings.mode_window_s)
-        if command.height_m is not None:
-            self._control.climb_to(command.height_m)
-        if command.number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
-            self._control.expect_armed(True, now + self.settings.mode_window_s)
-        self._send(command.message(self.telemetry.system_id, _AUTOPILOT, confirmation))
-
-    def _send(self, message: Message) -> None:
-        self._outgoing.append(self.codec.encode(message))
-
-    def _done(self, done: list[CommandDone]) -> None:
-        for event in done:
-            if not self._streams.on_answer(event.ticket, refused=isinstance(event.outcome, Refused)):
-                self._events.append(event)
-
-    def _pop_events(self) -> list[VehicleEvent]:
-        events, self._events = self._events, []
-        return events
+            self._heard.base = replace(self._heard.base, ready_to_arm=ready)

@@ -8,6 +8,15 @@ from service.mavlink.modes import ModeKind
 
 
 @dataclass(frozen=True, slots=True)
+class Home:
+    """HOME_POSITION: where the vehicle returns to; metres above mean sea level."""
+
+    lat: float
+    lon: float
+    alt_amsl_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Target:
     """A place to fly to: degrees in WGS84, metres above mean sea level."""
 
@@ -150,11 +159,43 @@ class TargetNotTaken:
 
 @dataclass(frozen=True, slots=True)
 class TargetReplaced:
-    """In the guided mode, but somebody else has given another target."""
+    """In the guided mode, but somebody else has given another target: the aircraft is theirs now, and not ours."""
 
     time: float
-    target: Target
+    target: Target | None
+    """The last one of ours, if one was under way."""
     found: Target
+    by: str
+    """Who it was, as a sentence's subject, as far as that can be told."""
+
+
+@dataclass(frozen=True, slots=True)
+class AnotherService:
+    """Something else speaks with our MAVLink system and component: a second service on this aircraft, most likely."""
+
+    time: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceMoved:
+    """What heights or places are counted from has moved: "home", "origin" (of the estimator) or "sea level" (the
+    altitude of home that the position's two altitudes imply; without a place). `position_too`: the position has jumped
+    the same way, so that a place may be another one now than the map says."""
+
+    time: float
+    what: str
+    before: Home
+    after: Home
+    position_too: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something about the aircraft or its link that a person must hear of; it changes nothing by itself."""
+
+    time: float
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,5 +221,8 @@ VehicleEvent = (
     | TargetTaken
     | TargetNotTaken
     | TargetReplaced
+    | AnotherService
+    | ReferenceMoved
+    | Notice
     | CommandDone
 )

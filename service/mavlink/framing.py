@@ -37,6 +37,8 @@ class Codec:
         self._mav = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         self.signer = signer
         """Its timestamp is for the owner of the link to keep."""
+        self.speaks_v1 = False
+        """Send MAVLink 1: the vehicle understands nothing else. Never with a signer."""
         self.refused = 0
         """Good frames that were not signed as they should be."""
 
@@ -49,14 +51,21 @@ class Codec:
     def system_id(self, value: int) -> None:
         self._mav.srcSystem = value
 
+    def forget_vehicle(self, system_id: int) -> None:
+        """Another vehicle is waited for: speak as this system, in MAVLink 2, and take signed streams as new ones."""
+        self.system_id, self.speaks_v1, self.refused = system_id, False, 0
+        if self.signer is not None:
+            self.signer.forget_streams()
+
     @property
     def component_id(self) -> int:
         """The MAVLink component we speak as."""
         return int(self._mav.srcComponent)
 
     def encode(self, message: Message) -> bytes:
-        """One MAVLink 2 frame, signed if there is a signer."""
-        frame = bytes(message.pack(self._mav))
+        """One MAVLink 2 frame, signed if there is a signer; or a MAVLink 1 frame, where the vehicle knows no other."""
+        v1 = self.speaks_v1 and self.signer is None and 0 <= message.get_msgId() < 256
+        frame = bytes(message.pack(self._mav, force_mavlink1=v1))
         self._mav.seq = (self._mav.seq + 1) % 256
         return frame if self.signer is None else self.signer.sign(frame, message.crc_extra)
 

@@ -9,7 +9,8 @@ import math
 
 from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.events import Target
-from service.mavlink.settings import LinkSettings
+from service.mavlink.modes import mode_title
+from service.mavlink.settings import MavlinkSettings
 from service.mavlink.target import distance_m
 from service.mavlink.telemetry import Telemetry
 
@@ -19,7 +20,7 @@ _AFTER_STALL_S = 0.25
 def why_not_command(
     autopilot: Autopilot | None,
     telemetry: Telemetry,
-    settings: LinkSettings,
+    settings: MavlinkSettings,
     *,
     now: float,
     stalled_at: float,
@@ -46,10 +47,12 @@ def why_not_command(
 
 def why_not_guided(autopilot: Autopilot, telemetry: Telemetry) -> str | None:
     """Why no target would be flown in this mode."""
-    return None if telemetry.guided else f"the mode is {telemetry.mode}, not {autopilot.guided_mode}"
+    if telemetry.guided:
+        return None
+    return f"the mode is {mode_title(telemetry.mode)}, not {autopilot.guided_title}"
 
 
-def why_not_flying(telemetry: Telemetry, settings: LinkSettings, *, now: float) -> str | None:
+def why_not_flying(telemetry: Telemetry, settings: MavlinkSettings, *, now: float) -> str | None:
     """Why this is not an aircraft in the air at a known place."""
     if not telemetry.armed:
         return "the aircraft is not armed"
@@ -60,7 +63,7 @@ def why_not_flying(telemetry: Telemetry, settings: LinkSettings, *, now: float) 
     return None
 
 
-def why_not_there(telemetry: Telemetry, settings: LinkSettings, target: Target) -> str | None:
+def why_not_there(telemetry: Telemetry, settings: MavlinkSettings, target: Target) -> str | None:
     """Why this is not a place to fly to. PX4 accepts latitude 95, 0/0, and 5 km under the ground."""
     lat, lon, alt = target.lat, target.lon, target.alt_amsl_m
     if not (math.isfinite(lat) and math.isfinite(lon) and math.isfinite(alt)):

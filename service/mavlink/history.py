@@ -6,15 +6,15 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass
 
+from service.geometry import moved, turn_deg, wrapped_deg
 from service.mavlink.telemetry import Telemetry
 
 _LONGEST_GAP_S = 1.5
 _LONGEST_GUESS_S = 0.5
-_METRES_PER_DEGREE = 111_194.93
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class PastPose:
     """Place, attitude and speed at one time of the service's clock; degrees, metres, m/s."""
 
     time: float
@@ -34,7 +34,7 @@ class PoseHistory:
 
     def __init__(self, length_s: float) -> None:
         self._length_s = length_s
-        self._poses: list[Pose] = []
+        self._poses: list[PastPose] = []
         self._times: list[float] = []
         self._boots: list[float] = []
 
@@ -42,7 +42,7 @@ class PoseHistory:
         return len(self._poses)
 
     @property
-    def newest(self) -> Pose | None:
+    def newest(self) -> PastPose | None:
         """The last pose recorded."""
         return self._poses[-1] if self._poses else None
 
@@ -51,11 +51,11 @@ class PoseHistory:
         time = telemetry.position_time
         if self._times and time <= self._times[-1]:
             return
-        heading = telemetry.yaw_deg if math.isfinite(telemetry.yaw_deg) else telemetry.heading_deg
+        heading = telemetry.heading_deg if math.isfinite(telemetry.heading_deg) else telemetry.yaw_deg
         self._times.append(time)
         self._boots.append(-math.inf if telemetry.boot_time_s is None else telemetry.boot_time_s)
         self._poses.append(
-            Pose(
+            PastPose(
                 time=time,
                 lat=telemetry.lat,
                 lon=telemetry.lon,
@@ -72,11 +72,9 @@ class PoseHistory:
             keep = bisect_right(self._times, time - self._length_s)
             del self._times[:keep], self._poses[:keep], self._boots[:keep]
 
-    def clear(self) -> None:
-        """Forget everything, as after a reboot of the vehicle."""
-        self._poses.clear()
-        self._times.clear()
-        self._boots.clear()
+    def forget_boot(self) -> None:
+        """The vehicle has rebooted: its time since boot means another time now. Where it was stays true."""
+        self._boots = [-math.inf] * len(self._boots)
 
     def time_of_boot(self, boot_s: float) -> float | None:
         """The service's time at the vehicle's time since boot, between the samples that were received around it.
@@ -84,16 +82,16 @@ class PoseHistory:
         Up to half a second beyond the newest; None when the past does not reach that far, or the vehicle does not
         tell its time. What the link delays is in it, as it is in the time of every pose.
         """
-        if not math.isfinite(boot_s) or not self._boots or not self._boots[0] <= boot_s:
+        at = bisect_right(self._boots, boot_s) if math.isfinite(boot_s) else 0
+        if at == 0 or not math.isfinite(self._boots[at - 1]):
             return None
-        at = bisect_right(self._boots, boot_s)
         before, time = self._boots[at - 1], self._times[at - 1]
         if at == len(self._boots):
             return time + boot_s - before if boot_s - before <= _LONGEST_GUESS_S else None
         share = (boot_s - before) / (self._boots[at] - before)
         return time + share * (self._times[at] - time) if math.isfinite(share) else None
 
-    def pose_at(self, time: float) -> Pose | None:
+    def pose_at(self, time: float) -> PastPose | None:
         """The pose at a time, between two samples or carried on from the newest for up to half a second.
 
         None when the past does not reach that far, or the position was not received around that time.
@@ -114,33 +112,33 @@ class PoseHistory:
         return _between(before, after, time)
 
 
-def _between(a: Pose, b: Pose, time: float) -> Pose:
+def _between(a: PastPose, b: PastPose, time: float) -> PastPose:
     share = (time - a.time) / (b.time - a.time)
 
     def mix(x: float, y: float) -> float:
         return x + share * (y - x)
 
-    return Pose(
+    return PastPose(
         time=time,
         lat=mix(a.lat, b.lat),
-        lon=_wrapped(a.lon + share * _turn(a.lon, b.lon)),
+        lon=wrapped_deg(a.lon + share * turn_deg(a.lon, b.lon)),
         alt_amsl_m=mix(a.alt_amsl_m, b.alt_amsl_m),
         alt_home_m=mix(a.alt_home_m, b.alt_home_m),
-        roll_deg=_wrapped(a.roll_deg + share * _turn(a.roll_deg, b.roll_deg)),
+        roll_deg=wrapped_deg(a.roll_deg + share * turn_deg(a.roll_deg, b.roll_deg)),
         pitch_deg=mix(a.pitch_deg, b.pitch_deg),
-        heading_deg=(a.heading_deg + share * _turn(a.heading_deg, b.heading_deg)) % 360.0,
+        heading_deg=(a.heading_deg + share * turn_deg(a.heading_deg, b.heading_deg)) % 360.0,
         north_mps=mix(a.north_mps, b.north_mps),
         east_mps=mix(a.east_mps, b.east_mps),
     )
 
 
-def _carried_on(last: Pose, time: float) -> Pose:
+def _carried_on(last: PastPose, time: float) -> PastPose:
     seconds = time - last.time
-    narrowing = max(math.cos(math.radians(last.lat)), 1e-6)
-    return Pose(
+    lat, lon = moved((last.lat, last.lon), seconds * last.east_mps, seconds * last.north_mps)
+    return PastPose(
         time=time,
-        lat=last.lat + seconds * last.north_mps / _METRES_PER_DEGREE,
-        lon=_wrapped(last.lon + seconds * last.east_mps / (_METRES_PER_DEGREE * narrowing)),
+        lat=lat,
+        lon=lon,
         alt_amsl_m=last.alt_amsl_m,
         alt_home_m=last.alt_home_m,
         roll_deg=last.roll_deg,
@@ -149,13 +147,3 @@ def _carried_on(last: Pose, time: float) -> Pose:
         north_mps=last.north_mps,
         east_mps=last.east_mps,
     )
-
-
-def _turn(a: float, b: float) -> float:
-    """From one angle to another the short way, degrees."""
-    return (b - a + 180.0) % 360.0 - 180.0
-
-
-def _wrapped(angle: float) -> float:
-    """The same angle between -180 and 180."""
-    return (angle + 180.0) % 360.0 - 180.0 if not -180.0 <= angle <= 180.0 else angle

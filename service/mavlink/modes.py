@@ -17,3 +17,28 @@ class ModeKind(StrEnum):
     """Somebody's hands are on the sticks."""
     OTHER = "other"
     """Somebody else's plan: a mission, another computer, a mode we do not know."""
+
+
+_TITLES = {
+    "MANUAL": "Manual",
+    "ALTCTL": "Altitude",
+    "POSCTL": "Position",
+    "ACRO": "Acro",
+    "OFFBOARD": "Offboard",
+    "STABILIZED": "Stabilized",
+    "RATTITUDE": "Rattitude",
+    "AUTO_READY": "Ready",
+    "AUTO_TAKEOFF": "Takeoff",
+    "AUTO_LOITER": "Hold",
+    "AUTO_MISSION": "Mission",
+    "AUTO_RTL": "Return",
+    "AUTO_LAND": "Land",
+    "AUTO_FOLLOW": "Follow Me",
+    "AUTO_PRECLAND": "Precision Land",
+    "AUTO_VTOL_TAKEOFF": "VTOL Takeoff",
+}
+
+
+def mode_title(mode: str) -> str:
+    """What a ground station calls a mode. PX4's names are its own only in its code; ArduPilot's are what pilots say."""
+    return _TITLES.get(mode, mode)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from service.mavlink.settings import LinkSettings
+from service.mavlink.settings import MavlinkSettings
 from service.mavlink.telemetry import Telemetry
 
 _STATUS_FRESH_S = 5.0
@@ -18,7 +18,7 @@ _STATUS_FRESH_S = 5.0
 class Readiness:
     """Since when the pre-arm check has been healthy."""
 
-    def __init__(self, settings: LinkSettings) -> None:
+    def __init__(self, settings: MavlinkSettings) -> None:
         self._hold_s = settings.ready_hold_s
         self._fresh_s = max(_STATUS_FRESH_S, settings.link_lost_s)
         self._since: float | None = None

@@ -10,7 +10,7 @@ _SHORTEST_ANSWER_WALL_S = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class LinkSettings:
+class MavlinkSettings:
     """Settings of one link. All times are in seconds of the service's clock."""
 
     system_id: int | None = None
@@ -36,6 +36,8 @@ class LinkSettings:
     """Nothing that moves the aircraft is sent on a position older than this."""
     link_lost_s: float = 3.5
     """Silence after which the link counts as lost."""
+    shortest_age_s: float = 0.0
+    """No message counts as old sooner than this, whatever the table of sources says."""
     stall_s: float = 1.0
     """A pause of our own process after which everything known counts as old."""
 
@@ -44,6 +46,8 @@ class LinkSettings:
     in_progress_timeout_s: float = 10.0
     mode_window_s: float = 5.0
     """How long after a command a change to the mode it asks for counts as ours."""
+    arming_patience_s: float = 0.0
+    """How long arming is tried again when the vehicle refuses it."""
     ready_hold_s: float = 5.0
     """How long the pre-arm check must have stayed healthy (ArduPilot reports it healthy too early)."""
 
@@ -55,8 +59,12 @@ class LinkSettings:
     max_height_change_m: float = 150.0
     """A target this much above or below the aircraft is an altitude in another reference, not a waypoint."""
     max_speed_mps: float = 30.0
+    read_return_height: bool = False
+    """Ask for the parameter that says how high the autopilot flies home."""
+    read_motion: bool = False
+    """Ask for those that say how fast it may fly, and how hard it may speed up."""
 
-    def for_speedup(self, speedup: float) -> LinkSettings:
+    def for_speedup(self, speedup: float) -> MavlinkSettings:
         """The same settings with no limit shorter than what a busy host may need in wall time.
 
         At 20 times real time, two seconds of silence are a tenth of a second on the wall: the pause of a
@@ -68,6 +76,7 @@ class LinkSettings:
             heartbeat_fresh_s=max(self.heartbeat_fresh_s, silence),
             position_fresh_s=max(self.position_fresh_s, silence),
             link_lost_s=max(self.link_lost_s, 1.5 * silence),
+            shortest_age_s=max(self.shortest_age_s, silence) if speedup > 1.0 else self.shortest_age_s,
             stall_s=max(self.stall_s, silence),
             ack_timeout_s=max(self.ack_timeout_s, answer),
             mode_window_s=max(self.mode_window_s, 2 * silence),

@@ -92,6 +92,10 @@ class Signer:
         self.advance(timestamp)
         return True
 
+    def forget_streams(self) -> None:
+        """Whoever signed before is not there any more: every stream is heard for the first time again."""
+        self._streams.clear()
+
     def _signature(self, frame: bytes | bytearray) -> bytes:
         return hashlib.sha256(self._key + frame).digest()[:_SIGNATURE]
 

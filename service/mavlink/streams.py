@@ -10,27 +10,29 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
-from service.mavlink.autopilots.base import Stream
-from service.mavlink.settings import LinkSettings
+from service.mavlink.settings import MavlinkSettings
+from service.mavlink.sources import SOURCES, number_of
 
 _FIRST_PATIENCE_S = 3.0
 _LONGEST_PATIENCE_S = 30.0
 
 
-def common_streams(settings: LinkSettings) -> tuple[Stream, ...]:
-    """What the service reads from every autopilot, the most needed first."""
-    return (
-        Stream(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, settings.position_hz),
-        Stream(mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 2.0),
-        Stream(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, 2.0),
-        Stream(mavlink.MAVLINK_MSG_ID_ATTITUDE, settings.attitude_hz),
-        Stream(mavlink.MAVLINK_MSG_ID_SYS_STATUS, 1.0),
-        Stream(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, 1.0),
-        Stream(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, 1.0),
-        Stream(mavlink.MAVLINK_MSG_ID_HOME_POSITION, 0.5),
-        Stream(mavlink.MAVLINK_MSG_ID_VFR_HUD, 2.0),
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A message asked for at a rate; an optional one is not asked for again once it was refused."""
+
+    message_id: int
+    hz: float
+    optional: bool = False
+
+
+def streams_of(settings: MavlinkSettings, autopilot: str) -> tuple[Stream, ...]:
+    """What is asked of this autopilot, the most needed first."""
+    rates = {"GLOBAL_POSITION_INT": settings.position_hz, "ATTITUDE": settings.attitude_hz}
+    return tuple(
+        Stream(number_of(name), rates.get(name, source.hz), source.optional)
+        for name, source in SOURCES.items()
+        if source.told_by(autopilot)
     )
 
 

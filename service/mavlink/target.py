@@ -4,22 +4,32 @@ The acknowledgement of DO_REPOSITION is no judge (PX4 answers UNSUPPORTED and fl
 POSITION_TARGET_GLOBAL_INT, which both autopilots send and which names the final target at once. One target at
 a time:
 
-    start ──► WATCHED ── named ──► TAKEN ── another one named twice ──► (TargetReplaced) ──► idle
+    start ──► WATCHED ── named ──► TAKEN
                  │  ▲
         not named in time ──► resend, a few times, else (TargetNotTaken) ──► idle
+
+Beside it `Strangers` knows what the autopilot may name: the last few of ours, and where it hovered when we took it
+over. Another place named twice was given by somebody else (TargetReplaced), whether a target of ours is watched or not.
+So was one named once that a waypoint of ours, already on its way then, has replaced: that person was overtaken.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, replace
 from enum import Enum
 
+from service import geometry
 from service.mavlink.events import Target
 
-_METRES_PER_DEGREE = 111_194.93
 _REFUSAL_S = 0.5
 _REPLACED_AFTER = 2
+_SETTLED_AFTER = 3
+_OVERTAKES_S = (
+    1.0  # so long may a waypoint be on its way, while the autopilot names what somebody else gave it before
+)
+_OURS = 4  # an answer about one of them may still be on its way when the next is sent
 
 
 class Step(Enum):
@@ -37,15 +47,105 @@ class _Watched:
     attempts: int = 1
     taken: bool = False
     refusal: str = ""
-    strangers: int = 0
 
 
 def distance_m(a: Target, b: Target) -> float:
     """Horizontal distance on a sphere, good to 0.3 % over the few kilometres of a leg."""
-    north = (b.lat - a.lat) * _METRES_PER_DEGREE
-    turn = (b.lon - a.lon + 180.0) % 360.0 - 180.0
-    east = turn * _METRES_PER_DEGREE * math.cos(math.radians((a.lat + b.lat) / 2.0))
-    return math.hypot(north, east)
+    return geometry.distance_m((a.lat, a.lon), (b.lat, b.lon))
+
+
+def near(a: Target, b: Target, tolerance_m: float) -> bool:
+    """Whether two targets are the same, but for rounding."""
+    return distance_m(a, b) <= tolerance_m and abs(a.alt_amsl_m - b.alt_amsl_m) <= tolerance_m
+
+
+class Strangers:
+    """Tells a target that somebody else has given to the aircraft from those that it may have: see above.
+
+    What it hovers at by itself is learnt anew (`start_over`) whenever it was given to us, changed its mode, or was
+    stopped without a target: the same place named several times, or one of ours.
+    """
+
+    def __init__(self, tolerance_m: float) -> None:
+        self._tolerance_m = tolerance_m
+        self._ours: deque[Target] = deque()
+        self._settled = False
+        self._named: Target | None = (
+            None  # the last of ours that it named: as long as it goes on, nobody gave another
+        )
+        self._resting: Target | None = None
+        self._times_resting = 0
+        self._suspect: Target | None = None
+        self._times_suspect = 0
+        self._sent_at = self._suspect_at = -math.inf
+        self._off_until = -math.inf
+
+    @property
+    def suspect(self) -> Target | None:
+        """A place that is not ours and was named lately, but not often enough to be sure."""
+        return self._suspect
+
+    def look_away(self, until: float) -> None:
+        """We have asked for another mode, whose target it may name before its heartbeat shows the mode."""
+        self._off_until = until
+        self.start_over()
+
+    def start_over(self) -> None:
+        """It may go anywhere by itself now."""
+        self._ours.clear()
+        self._settled, self._resting, self._times_resting = False, None, 0
+        self._named = None
+        self._suspect, self._times_suspect = None, 0
+
+    def sent(self, target: Target, now: float) -> None:
+        """This one is ours."""
+        self._sent_at = now
+        self._ours.append(target)
+        while len(self._ours) > _OURS:
+            self._ours.popleft()
+
+    def sea_moved(self, by_m: float) -> None:
+        """All altitudes were corrected by so much: what it has may be named by the old one or the new one."""
+        self._ours.extend([replace(ours, alt_amsl_m=ours.alt_amsl_m + by_m) for ours in self._ours])
+        if self._resting is not None:
+            self._settled, self._resting, self._times_resting = False, None, 0
+        self._suspect, self._times_suspect = None, 0
+
+    def on_named(self, named: Target, now: float) -> Target | None:
+        """The autopilot has named its target; returns it once it is sure that somebody else has given it."""
+        if now < self._off_until:
+            return None
+        overtaken: Target | None = None
+        if any(near(ours, named, self._tolerance_m) for ours in self._ours):
+            self._settled, self._named = True, named
+            overtaken = self._overtaken(named)
+        elif self._named is not None and near(self._named, named, self._tolerance_m):
+            pass  # it does not take what was sent since
+        elif not self._settled:
+            self._learn(named)
+        elif self._resting is None or not near(self._resting, named, self._tolerance_m):
+            return self._suspicious(named, now)
+        self._suspect, self._times_suspect = None, 0
+        return overtaken
+
+    def _overtaken(self, named: Target) -> Target | None:
+        """What somebody else gave it just before the last of ours, which it names now, came."""
+        newest = self._ours and near(self._ours[-1], named, self._tolerance_m)
+        return self._suspect if newest and 0.0 <= self._suspect_at - self._sent_at < _OVERTAKES_S else None
+
+    def _learn(self, named: Target) -> None:
+        if self._resting is not None and near(self._resting, named, self._tolerance_m):
+            self._times_resting += 1
+            self._settled = self._times_resting >= _SETTLED_AFTER
+        else:
+            self._resting, self._times_resting = named, 1
+
+    def _suspicious(self, named: Target, now: float) -> Target | None:
+        if self._suspect is None or not near(self._suspect, named, self._tolerance_m):
+            self._suspect, self._times_suspect, self._suspect_at = named, 1, now
+            return None
+        self._times_suspect += 1
+        return named if self._times_suspect >= _REPLACED_AFTER else None
 
 
 class TargetWatch:
@@ -97,26 +197,18 @@ class TargetWatch:
         if self._watched is not None and not self._watched.taken:
             self._watched.refusal = answer
 
-    def on_named(self, named: Target | None, now: float) -> tuple[float | None, Target | None]:
-        """The autopilot has named its target: (seconds until ours was taken, whose target replaced ours)."""
+    def on_named(self, named: Target | None, now: float) -> float | None:
+        """The autopilot has named its target: the seconds until ours was taken, when it is that for the first time."""
         watched = self._watched
-        if watched is None or named is None:
-            return None, None
-        ours = (
-            distance_m(watched.target, named) <= self._tolerance_m
-            and abs(watched.target.alt_amsl_m - named.alt_amsl_m) <= self._tolerance_m
-        )
-        if ours:
-            watched.strangers = 0
-            if watched.taken:
-                return None, None
-            watched.taken = True
-            return now - watched.first_sent, None
-        if watched.taken:
-            watched.strangers += 1
-            if watched.strangers >= _REPLACED_AFTER:
-                return None, named
-        return None, None
+        if (
+            watched is None
+            or watched.taken
+            or named is None
+            or not near(watched.target, named, self._tolerance_m)
+        ):
+            return None
+        watched.taken = True
+        return now - watched.first_sent
 
     def due(self, now: float) -> Step | None:
         """What a target that has not been named needs now."""

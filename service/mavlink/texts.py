@@ -51,7 +51,7 @@ def _said(now: float, severity: int, text: str) -> list[StatusText]:
 
 
 def text_messages(text: str, severity: int, text_id: int) -> list[Message]:
-    """STATUSTEXT messages for our own text: ASCII, one message up to 50 characters, else chunks up to 200.
+    """STATUSTEXT messages for our own text: ASCII, one message up to 50 characters, else chunks of whole words.
 
     Args:
         text: what to say; other characters become question marks.
@@ -61,7 +61,19 @@ def text_messages(text: str, severity: int, text_id: int) -> list[Message]:
     plain = " ".join(text.split()).encode("ascii", "replace")[:_LONGEST]
     if len(plain) <= _CHUNK:
         return [mavlink.MAVLink_statustext_message(severity, plain, 0, 0)]
-    chunks = [plain[i : i + _CHUNK] for i in range(0, len(plain), _CHUNK)]
+    chunks = _pieces(plain)
     if len(chunks[-1]) == _CHUNK:  # only a shorter chunk ends a text
         chunks.append(b"")
     return [mavlink.MAVLink_statustext_message(severity, c, text_id, i) for i, c in enumerate(chunks)]
+
+
+def _pieces(plain: bytes) -> list[bytes]:
+    """Whole words in pieces of 50 characters, filled up with spaces, for a shorter one would end the text; the last
+    one is as long as it is. A word that is longer than a piece is cut."""
+    pieces: list[bytes] = []
+    while len(plain) > _CHUNK:
+        cut = plain.rfind(b" ", 1, _CHUNK)
+        cut = _CHUNK if cut < 0 else cut
+        pieces.append(plain[:cut].ljust(_CHUNK))
+        plain = plain[cut:].lstrip()
+    return [*pieces, plain]

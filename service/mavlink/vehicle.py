@@ -1,43 +1,48 @@
-"""The vehicle as the rest of the service sees it: the core, a wire, and things to wait for.
+"""The vehicle as the rest of the service sees it: what is known of it, and what it can be told to do.
 
-    async with Vehicle.open("udpin://0.0.0.0:14540", clock=clock, settings=LinkSettings()) as vehicle:
+    async with Vehicle.open("udpin://0.0.0.0:14540", clock=clock, settings=MavlinkSettings()) as vehicle:
         await vehicle.connect(30.0)
         await vehicle.enter_guided()  # an order: the aircraft is ours to move until its pilot takes it
         vehicle.reposition(47.3977, 8.5456, 520.0)
         async for event in vehicle.events():
             ...
 
-Waiting is done here, deciding in the core. Before anything that moves the aircraft is sent, everything that
-the wire has is read first, so that the decision is taken on the last heartbeat there is, not on the last one
-that the event loop got round to.
+Waiting is done here and in the shell, deciding in the core. Before anything that moves the aircraft is sent, everything
+that the wire has is read first (`Shell.pump`), so that the decision is taken on the last heartbeat there is.
 """
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
+import math
 from collections.abc import AsyncIterator, Callable
-from typing import TypeVar
 
 from service.clock import Clock
 from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.command import Command
 from service.mavlink.core import LinkCore
 from service.mavlink.errors import CommandFailed, NotPermitted, NoVehicle
-from service.mavlink.events import Accepted, Cancelled, CommandDone, Outcome, Refused, Target, VehicleEvent
-from service.mavlink.history import Pose, PoseHistory
-from service.mavlink.keeper import TimestampKeeper
-from service.mavlink.settings import LinkSettings
+from service.mavlink.events import (
+    Accepted,
+    Cancelled,
+    Notice,
+    Outcome,
+    Refused,
+    Target,
+    VehicleEvent,
+)
+from service.mavlink.history import PastPose, PoseHistory
+from service.mavlink.modes import mode_title
+from service.mavlink.settings import MavlinkSettings
+from service.mavlink.shell import Shell
 from service.mavlink.telemetry import Telemetry
-from service.mavlink.transports import Transport, make_transport
+from service.mavlink.transports import make_transport
 from service.mavlink.url import parse_url
 
-_T = TypeVar("_T")
-_TICK_S = 0.05
-_SHORTEST_TICK_WALL_S = 0.005
-_PATIENCE_WALL_S = 1.0
 _MODE_S = 6.0
 _COMPLAINT_S = 0.3
+_ARM_AGAIN_S = 2.0
+_LATELY_S = 10.0
 _CLIMB_START_S = 20.0
 _CLIMB_MPS = 0.7
 _SEVERITY_INFO = 6
@@ -47,20 +52,15 @@ _SEVERITY_WARNING = 4
 class Vehicle:
     """One aircraft on one link. Made by `Vehicle.open`."""
 
-    def __init__(self, transport: Transport, clock: Clock, settings: LinkSettings) -> None:
-        self.settings = settings.for_speedup(clock.speedup)
-        self._clock = clock
-        self._transport = transport
-        self._core = LinkCore(self.settings, speaks_first=transport.speaks_first)
-        self._queue: asyncio.Queue[VehicleEvent | None] = asyncio.Queue()
-        self._changed = asyncio.Event()
-        self._waiting: dict[int, asyncio.Future[Outcome]] = {}
-        self._keeper: TimestampKeeper | None = None
+    def __init__(self, shell: Shell) -> None:
+        self._shell = shell
+        self._clock = shell.clock
+        self.settings = shell.core.settings
 
     @classmethod
     @contextlib.asynccontextmanager
     async def open(
-        cls, url: str, *, clock: Clock, settings: LinkSettings | None = None
+        cls, url: str, *, clock: Clock, settings: MavlinkSettings | None = None
     ) -> AsyncIterator[Vehicle]:
         """Open the link and keep it up for as long as the block lasts.
 
@@ -68,49 +68,25 @@ class Vehicle:
             BadInput: the address cannot be used, or the signing timestamp cannot be kept.
             LinkError: the port or device cannot be opened.
         """
-        transport = make_transport(parse_url(url))
-        vehicle = cls(transport, clock, settings or LinkSettings())
-        vehicle._begin_signing()
-        await transport.open()
-        failure: Exception | None = None
-        try:
-            async with asyncio.TaskGroup() as group:
-                tasks = [
-                    group.create_task(transport.run(vehicle._pump), name="mavlink wire"),
-                    group.create_task(vehicle._tick_for_ever(), name="mavlink tick"),
-                ]
-                if vehicle._keeper is not None:
-                    tasks.append(group.create_task(vehicle._keeper.run(), name="mavlink signing"))
-                try:
-                    yield vehicle
-                except Exception as error:  # leaves as it is, not wrapped into the group of our tasks' errors
-                    failure = error
-                finally:
-                    for task in tasks:
-                        task.cancel()
-        finally:
-            transport.close()
-            vehicle._queue.put_nowait(None)
-        if failure is not None:
-            raise failure
+        shell = Shell(make_transport(parse_url(url)), clock, settings or MavlinkSettings())
+        async with shell.running():
+            yield cls(shell)
 
-    def _begin_signing(self) -> None:
-        signer = self._core.codec.signer
-        if signer is not None:
-            self._keeper = TimestampKeeper(signer, self.settings.signing_timestamp_file)
-            self._keeper.begin()
+    @property
+    def _core(self) -> LinkCore:
+        return self._shell.core
 
     # ---- what is known
 
     @property
     def address(self) -> str:
         """The link's address, with the port in use."""
-        return self._transport.address
+        return self._shell.address
 
     @property
     def telemetry(self) -> Telemetry:
-        """The last that the vehicle has said."""
-        return self._core.telemetry
+        """What can be believed now of what the vehicle has said."""
+        return self._core.telemetry_at(self._clock.now())
 
     @property
     def received(self) -> float | None:
@@ -137,7 +113,11 @@ class Vehicle:
         """The last target sent, unless it was given up."""
         return self._core.target
 
-    def pose_at(self, time: float) -> Pose | None:
+    def missing(self) -> list[str]:
+        """What this vehicle lacks that must be there before it leaves the ground, as sentences' ends."""
+        return self._core.missing()
+
+    def pose_at(self, time: float) -> PastPose | None:
         """Where it was at a time of the service's clock, or None if that is not known."""
         return self._core.history.pose_at(time)
 
@@ -149,22 +129,21 @@ class Vehicle:
         """Why `reposition` would refuse now, as a sentence's end, or None."""
         return self._core.why_not_reposition(self._clock.now())
 
-    async def events(self) -> AsyncIterator[VehicleEvent]:
+    def events(self) -> AsyncIterator[VehicleEvent]:
         """Everything that happens, in order, from the opening of the link on; ends when the link is closed.
 
         There is one stream of events, for one reader.
         """
-        while (event := await self._queue.get()) is not None:
-            yield event
+        return self._shell.events()
 
     @property
     def events_waiting(self) -> bool:
         """True while `telemetry` is ahead of what the reader of `events` has been told."""
-        return not self._queue.empty()
+        return self._shell.events_waiting
 
     async def wait_until(self, condition: Callable[[Telemetry], bool], timeout_s: float) -> bool:
         """Wait until what is known fulfils a condition; False if it did not in time."""
-        return await self._until(lambda: condition(self._core.telemetry) or None, timeout_s) is not None
+        return await self._shell.until(lambda: condition(self.telemetry) or None, timeout_s) is not None
 
     # ---- waiting for a vehicle
 
@@ -176,7 +155,7 @@ class Vehicle:
         """
         if await self.wait_until(lambda t: self._core.paired and t.position_known, timeout_s):
             return self.telemetry
-        core, where = self._core, self._transport.address
+        core, where = self._core, self._shell.address
         if core.autopilot is not None:
             raise NoVehicle(
                 f"system {core.telemetry.system_id} ({core.autopilot.title}) is heard on {where} "
@@ -219,39 +198,68 @@ class Vehicle:
 
     # ---- orders of an operator
 
-    async def enter_guided(self) -> None:
+    def forget(self, system_id: int | None = None) -> None:
+        """On an operator's order: this is another aircraft from now on, the next that is heard on the link or, with a
+        system id, that one alone; `connect` waits for it. Nothing is known of it until then, and it is not ours."""
+        self._shell.forget(system_id)
+
+    async def enter_guided(self, *, there: bool = False) -> None:
         """On an operator's order: enter the guided mode if need be, and take control.
 
+        Args:
+            there: nobody has ordered it: its pilot gives the aircraft over by having selected the mode.
+
         Raises:
-            NotPermitted: the vehicle is not heard.
+            NotPermitted: the vehicle is not heard, or is not in the mode where it has to be `there`.
             CommandFailed: it does not enter the mode.
         """
-        self._pump()
+        self._shell.pump()
+        if not self.telemetry.guided and there:
+            raise NotPermitted(f"its pilot has selected {mode_title(self.telemetry.mode)}")
         if not self.telemetry.guided:
             autopilot = self._need_autopilot()
             await self._reach(autopilot.set_mode(autopilot.guided_mode), autopilot.guided_mode, ordered=True)
         self._core.take_control(self._clock.now())
 
     async def arm(self) -> None:
-        """On the ground, in our control (`enter_guided`): arm.
+        """On the ground, in our control (`enter_guided`): arm; tried again for `settings.arming_patience_s`, while what
+        the vehicle says against it is told as notices.
 
         Raises:
-            NotPermitted: arming is not allowed to this process, or the vehicle is not ready, or not in our control.
+            NotPermitted: arming is not allowed to this process, or the vehicle is not in our control.
             CommandFailed: it does not arm.
         """
-        self._pump()
+        until, told = self._clock.now() + self.settings.arming_patience_s, ""
+        while refusal := await self._arm_once():
+            if self._clock.now() >= until and (self.missing() or not self.telemetry.ready_to_arm):
+                raise NotPermitted(f"the vehicle was not armed: {refusal}")
+            if self._clock.now() >= until:
+                raise CommandFailed(f"the vehicle did not arm: {refusal}")
+            if refusal != told:
+                self._shell.publish([Notice(self._clock.now(), f"not armed yet: {refusal}")])
+                told = refusal
+            await self._clock.sleep(_ARM_AGAIN_S)
+
+    async def _arm_once(self) -> str:
+        """Arm; returns why it did not, or nothing."""
+        self._shell.pump()
         if not self.settings.allow_arming:
             raise NotPermitted("this service was not allowed to arm or take off (--takeoff)")
         if self.telemetry.armed:
-            return
+            return ""
+        since = self._clock.now()
+        if self.in_control:
+            await self.wait_until(lambda _: self._core.reposition_known, self._shell.patience(5.0))
+        if missing := self.missing():
+            return "; ".join(missing)
         if not self.telemetry.ready_to_arm:
-            raise NotPermitted("the vehicle was not armed: it is not ready")
+            return "it is not ready" + self._complaint(since - _LATELY_S)
         if not self.in_control:
             raise NotPermitted(f"the vehicle was not armed: {self.telemetry.control_reason}")
-        autopilot, since = self._need_autopilot(), self._clock.now()
-        outcome = await self._ask(autopilot.arm())
-        if not await self.wait_until(lambda t: t.armed, self._patience(3.0)):
-            raise CommandFailed(f"the vehicle did not arm: {await self._explain(outcome, since)}")
+        outcome = await self._shell.ask(self._need_autopilot().arm())
+        if await self.wait_until(lambda t: t.armed, self._shell.patience(3.0)):
+            return ""
+        return await self._explain(outcome, since)
 
     async def take_off(self, height_m: float) -> None:
         """Climb to a height above home, armed and in our control; returns when up there in the guided mode.
@@ -260,7 +268,7 @@ class Vehicle:
             NotPermitted: not armed, not on the ground, not in our control, or not allowed to this process.
             CommandFailed: it did not get there; whatever it does then, it does by itself.
         """
-        self._pump()
+        self._shell.pump()
         autopilot, t, since = self._need_autopilot(), self.telemetry, self._clock.now()
         if not 1.0 <= height_m <= self.settings.max_height_change_m:
             limit = self.settings.max_height_change_m
@@ -271,7 +279,7 @@ class Vehicle:
             state = "armed" if t.armed else "not armed"
             raise NotPermitted(f"no take-off: the vehicle is {state} and says {t.landed_state!r}")
         command = autopilot.take_off(height_m, t.home_alt_amsl_m)
-        outcome = await self._ask(command)
+        outcome = await self._shell.ask(command)
         if not isinstance(outcome, Accepted) and not self._climbing():
             raise CommandFailed(f"the vehicle did not take off: {await self._explain(outcome, since)}")
 
@@ -282,10 +290,13 @@ class Vehicle:
             up = t.landed_state == "in_air" and t.alt_home_m >= height_m - max(0.1 * height_m, 1.0)
             return "up" if up and t.guided else None
 
-        result = await self._until(ended, self._patience(_CLIMB_START_S + height_m / _CLIMB_MPS))
+        result = await self._shell.until(ended, self._shell.patience(_CLIMB_START_S + height_m / _CLIMB_MPS))
         if result != "up":
             t = self.telemetry
-            why = result or f"it is at {t.alt_home_m:.1f} m and says {t.landed_state!r}, mode {t.mode}"
+            why = (
+                result
+                or f"it is at {t.alt_home_m:.1f} m and says {t.landed_state!r}, mode {mode_title(t.mode)}"
+            )
             raise CommandFailed(f"the take-off to {height_m:g} m did not end: {why}{self._complaint(since)}")
 
     async def return_to_launch(self, *, ordered: bool = False) -> None:
@@ -315,16 +326,28 @@ class Vehicle:
         Raises:
             NotPermitted: it is not ours to move now, or the place is not one to fly to. Nothing was sent.
         """
-        self._pump()
+        self._shell.pump()
         self._core.reposition(lat, lon, alt_amsl_m, self._clock.now())
-        self._flush()
+        self._shell.flush()
         return self._clock.now()
 
-    def hold(self) -> float:
-        """Stop here, in the guided mode; returns the time at which that went out. Raises NotPermitted."""
-        self._pump()
-        self._core.hold(self._clock.now())
-        self._flush()
+    def hold(self, least_amsl_m: float = math.nan) -> float:
+        """Stop here, in the guided mode, not below an altitude above the sea (NaN: at the present one); returns the
+        time at which that went out. Raises NotPermitted."""
+        self._shell.pump()
+        self._core.hold(self._clock.now(), least_amsl_m)
+        self._shell.flush()
+        return self._clock.now()
+
+    def brake(self) -> float:
+        """Stop here without knowing where 'here' is; returns the time at which that went out. Raises NotPermitted.
+
+        ArduCopter stops in its mode BRAKE, which was asked for and so is no pilot's: `enter_guided` leads out of it.
+        PX4 stays in Hold.
+        """
+        self._shell.pump()
+        self._core.brake(self._clock.now())
+        self._shell.flush()
         return self._clock.now()
 
     async def set_speed(self, speed_mps: float) -> None:
@@ -337,9 +360,9 @@ class Vehicle:
         if not 0.1 <= speed_mps <= self.settings.max_speed_mps:
             limit = self.settings.max_speed_mps
             raise NotPermitted(f"no speed of {speed_mps} m/s: between 0.1 and {limit:g} m/s is possible")
-        self._pump()
+        self._shell.pump()
         since = self._clock.now()
-        outcome = await self._ask(self._need_autopilot().change_speed(speed_mps))
+        outcome = await self._shell.ask(self._need_autopilot().change_speed(speed_mps))
         if not isinstance(outcome, Accepted):
             why = await self._explain(outcome, since)
             raise CommandFailed(f"the vehicle did not take a speed of {speed_mps:g} m/s: {why}")
@@ -347,7 +370,7 @@ class Vehicle:
     def release_control(self, reason: str) -> None:
         """Give control up until `enter_guided`: nothing that moves the aircraft is sent any more."""
         self._core.release_control(reason, self._clock.now())
-        self._flush()
+        self._shell.flush()
 
     def stand_by(self, reason: str) -> None:
         """What was sent is not wanted any more: neither the last target nor a command that moves it is repeated."""
@@ -356,57 +379,10 @@ class Vehicle:
     def status_text(self, text: str, severity: int = _SEVERITY_INFO) -> bool:
         """Say something to the pilot; False if no vehicle was heard yet."""
         said = self._core.status_text(text, severity)
-        self._flush()
+        self._shell.flush()
         return said
 
-    # ---- the shell
-
-    def _pump(self) -> None:
-        """Take in everything that the wire has, then send what that caused."""
-        chunks, now = self._transport.receive(), self._clock.now()
-        for data, source in chunks:  # one time for all: what waited in the buffer is as old as its oldest
-            self._publish(self._core.receive_data(data, now, source))
-        self._flush()
-        self._announce()
-
-    async def _tick_for_ever(self) -> None:
-        pause = max(_TICK_S, _SHORTEST_TICK_WALL_S * self._clock.speedup)
-        while True:
-            self._pump()
-            self._publish(self._core.tick(self._clock.now()))
-            self._flush()
-            self._announce()
-            await self._clock.sleep(pause)
-
-    def _flush(self) -> None:
-        for frame in self._core.data_to_send():
-            self._transport.send(frame, self._core.destination)
-
-    def _publish(self, events: list[VehicleEvent]) -> None:
-        for event in events:
-            self._queue.put_nowait(event)
-            if isinstance(event, CommandDone):
-                waiting = self._waiting.pop(event.ticket, None)
-                if waiting is not None and not waiting.done():
-                    waiting.set_result(event.outcome)
-
-    def _announce(self) -> None:
-        changed, self._changed = self._changed, asyncio.Event()
-        changed.set()
-
-    async def _until(self, condition: Callable[[], _T | None], timeout_s: float) -> _T | None:
-        """Wait until a condition gives something; None if it did not in time."""
-        try:
-            async with self._clock.timeout(timeout_s):
-                while (value := condition()) is None:
-                    await self._changed.wait()
-                return value
-        except TimeoutError:
-            return condition()
-
-    def _patience(self, seconds: float) -> float:
-        """A time to wait for an answer, never too short in wall time for a busy host."""
-        return max(seconds, _PATIENCE_WALL_S * self._clock.speedup)
+    # ---- what orders share
 
     def _need_autopilot(self) -> Autopilot:
         if self._core.autopilot is None:
@@ -416,19 +392,8 @@ class Vehicle:
     def _climbing(self) -> bool:
         return self.telemetry.landed_state in ("takeoff", "in_air")
 
-    async def _ask(self, command: Command, *, ordered: bool = False) -> Outcome:
-        """Send a command and wait for its end, which the core sees to."""
-        ticket = self._core.request(command, self._clock.now(), ordered=ordered)
-        future: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
-        self._waiting[ticket] = future
-        self._flush()
-        try:
-            return await future
-        finally:
-            self._waiting.pop(ticket, None)
-
     async def _go(self, command: Command, mode: str, *, ordered: bool) -> None:
-        self._pump()
+        self._shell.pump()
         if self.telemetry.mode == mode and self.telemetry.armed:
             return
         await self._reach(command, mode, ordered=ordered)
@@ -437,12 +402,11 @@ class Vehicle:
         """Send a command and wait for the mode it leads to; the heartbeat is the judge, not the answer."""
         since = self._clock.now()
         before = self.telemetry.mode
-        outcome = await self._ask(command, ordered=ordered)
-        wait = 0.0 if isinstance(outcome, Cancelled) else self._patience(_MODE_S)
+        outcome = await self._shell.ask(command, ordered=ordered)
+        wait = 0.0 if isinstance(outcome, Cancelled) else self._shell.patience(_MODE_S)
         if not await self.wait_until(lambda t: t.mode == mode, wait):
-            raise CommandFailed(
-                f"the vehicle did not go from {before} to {mode}: {await self._explain(outcome, since)}"
-            )
+            why, (was, wanted) = await self._explain(outcome, since), map(mode_title, (before, mode))
+            raise CommandFailed(f"the vehicle did not go from {was} to {wanted}: {why}")
 
     async def _explain(self, outcome: Outcome, since: float) -> str:
         """What became of a command that did not do what it should, for a person."""

@@ -10,21 +10,57 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from service.config import FlightSettings
-from service.mavlink.telemetry import Wind
+import numpy as np
+from numpy.typing import NDArray
 
-Metres = tuple[float, float]
-"""(east, north)."""
+from roisearch.motion import leg_seconds
+from service.config import FlightSettings
+from service.geometry import LatLon, Metres
+from service.mavlink.telemetry import Telemetry, Wind
 
 _RECENT = 6  # falls of the battery's percent that count as 'of late'
 _FEWEST = 2  # falls that are needed to say anything
 _CORRECTION_PERCENT = 5.0  # a fall by more at once is the autopilot correcting itself, not consumption
-_STEADY_MPS, _STEADY_S = 0.7, 4.0
-_FELT_FOR_S = 300.0
 _SLOWEST_MPS = 0.5  # slower over ground counts as not getting home at all
+
+
+_WORN = frozenset({"low", "critical", "emergency", "failed", "unhealthy"})
+_STUCK_PERCENT = 10.0  # a level that stands still while so much is used is no level
+_FIRST_WORD_S = 15.0  # so long after the first look the battery may not have been told yet
+
+
+class Level:
+    """The battery's level, counted down while nobody tells it, or what is told stands still."""
+
+    def __init__(self) -> None:
+        self._percent: float | None = None
+        self._at = self._since = 0.0
+        self.stuck = False
+        """The same level has been told for so long that it cannot be true."""
+
+    def update(self, told: float | None, percent_per_s: float, now: float) -> float | None:
+        """Take in what is told (None: nothing) at a time in seconds; returns the level to reckon with, in percent.
+
+        Untold, it is the last one told, less what `percent_per_s` has cost since; None while it never was. One that has
+        not changed while `percent_per_s` has cost `_STUCK_PERCENT` is what it was when it was told first, less that.
+        """
+        if told is not None and told != self._percent:
+            self._percent, self._since = told, now
+        used = percent_per_s * (now - self._since)
+        self.stuck = told is not None and used > _STUCK_PERCENT
+        if told is not None:
+            self._at = self._since if self.stuck else now
+        if self._percent is None:
+            return None
+        return max(0.0, self._percent - percent_per_s * (now - self._at))
+
+
+def cost_per_s(measured: float | None, flight: FlightSettings) -> float:
+    """What a second in the air costs, in percent: as measured, else as a full battery is said to last."""
+    return 100.0 / flight.full_battery_s if measured is None else measured
 
 
 class Consumption:
@@ -66,6 +102,12 @@ class Consumption:
         ]
         return max(rates, default=None)
 
+    def level(self, percent: float, now: float) -> float:
+        """The level between two whole percents, reckoned down since it fell to the one that is told, in percent."""
+        if not self._falls or self._rate is None or self._falls[-1][1] != percent:
+            return percent
+        return max(percent - 1.0, percent - self._rate * (now - self._falls[-1][0]))
+
     @property
     def percent_per_s(self) -> float | None:
         """Percent of the battery a second; None while too little of it was used to say."""
@@ -88,50 +130,52 @@ def speed_over_ground(leg: Metres, wind: Wind | None, flight: FlightSettings) ->
     return min(flight.speed_mps, ahead + along)
 
 
-class WindFelt:
-    """The wind as the autopilot tells it, else as the speed that is missing says.
-
-    An aircraft that is under way, steadily, and slower over ground than it should be flies as fast through the air as
-    it can: the wind against it is what is missing to `flight.max_airspeed_mps`. That is kept for a while.
-    """
-
-    def __init__(self, flight: FlightSettings) -> None:
-        self._flight = flight
-        self._felt: Wind | None = None
-        self._felt_at = self._steady_since = -math.inf
-        self._speed = math.nan
-
-    def update(self, told: Wind | None, velocity: Metres, under_way: bool, now: float) -> Wind | None:
-        """Take one moment in: the wind told, the velocity (east, north) over ground in m/s, and whether the aircraft
-        is too far from its waypoint to brake for it. Returns the wind to reckon with; None: there is none."""
-        if told is not None:
-            return told
-        speed = math.hypot(*velocity)
-        if not under_way or not abs(speed - self._speed) < _STEADY_MPS:
-            self._speed, self._steady_since = speed, now if under_way else math.inf
-        elif now - self._steady_since >= _STEADY_S and speed > _SLOWEST_MPS:
-            missing = self._flight.max_airspeed_mps - speed
-            if speed < self._flight.speed_mps - 1.0 and missing > 0.0:
-                east, north = velocity[0] / speed, velocity[1] / speed
-                self._felt, self._felt_at = Wind(-missing * north, -missing * east), now
-        if now - self._felt_at > _FELT_FOR_S:
-            self._felt = None
-        return self._felt
+def legs_seconds(legs: NDArray[np.float64], wind: Wind | None, flight: FlightSettings) -> NDArray[np.float64]:
+    """Seconds for each of many legs, (east, north) in metres [n, 2], as `WayHome.along` reckons them, float [n]."""
+    length = np.hypot(*legs.T)
+    speed = np.full(len(legs), flight.speed_mps)
+    if wind is not None:
+        east, north = legs.T / np.maximum(length, 1e-9)
+        along, across = (
+            wind.east_mps * east + wind.north_mps * north,
+            wind.east_mps * north - wind.north_mps * east,
+        )
+        speed = np.minimum(speed, np.sqrt(np.maximum(flight.max_airspeed_mps**2 - across**2, 0.0)) + along)
+    goes = speed >= _SLOWEST_MPS
+    both = 1.0 / flight.acceleration_mps2 + 1.0 / flight.deceleration_mps2
+    peak = np.minimum(np.where(goes, speed, 1.0), np.sqrt(2.0 * np.maximum(length, 1e-9) / both))
+    seconds = length / peak + 0.5 * peak * both
+    return np.where(length <= 0.0, 0.0, np.where(goes, seconds, np.inf))
 
 
 @dataclass(frozen=True, slots=True)
 class WayHome:
-    """What is left to fly: metres over ground, seconds until on the ground, and the wind against it (m/s, 0: none)."""
+    """What is left to fly: metres over ground, seconds until on the ground, and the wind against it (m/s, 0: none).
+
+    `upright_s` of the seconds are climb and descent, and `waits_s` a hover over home while others land.
+    """
 
     length_m: float
     seconds: float
     against_mps: float
+    upright_s: float = 0.0
+    waits_s: float = 0.0
+
+    def waiting(self, seconds: float) -> WayHome:
+        """The same with a wait over home."""
+        return replace(self, seconds=self.seconds + seconds, waits_s=self.waits_s + seconds)
 
     @classmethod
     def along(
-        cls, points: Sequence[Metres], height_m: float, wind: Wind | None, flight: FlightSettings
+        cls,
+        points: Sequence[Metres],
+        height_m: float,
+        wind: Wind | None,
+        flight: FlightSettings,
+        return_m: float | None = None,
     ) -> WayHome:
-        """The way through points (here first, home last), from a height above home in metres.
+        """The way through points (here first, home last), with a stop at each, from a height above home in metres,
+        flown at `return_m` above home; None: as the autopilot's own return is set.
 
         Its seconds are infinite when the wind does not let the aircraft get there.
         """
@@ -140,14 +184,41 @@ class WayHome:
             leg = (there[0] - here[0], there[1] - here[1])
             metres = math.hypot(*leg)
             speed = speed_over_ground(leg, wind, flight)
-            seconds += metres / speed if speed >= _SLOWEST_MPS else (math.inf if metres > 0 else 0.0)
+            if metres > 0.0 and speed < _SLOWEST_MPS:
+                seconds = math.inf
+            elif metres > 0.0:
+                seconds += leg_seconds(metres, speed, flight.acceleration_mps2, flight.deceleration_mps2)
             length += metres
             if wind is not None and metres > 0:
                 head -= wind.east_mps * leg[0] + wind.north_mps * leg[1]
-        climb = max(0.0, flight.return_height_m - height_m)
-        descent = max(flight.return_height_m, height_m)
-        seconds += climb / flight.climb_mps + descent / flight.descent_mps
-        return cls(length, seconds, max(0.0, head / length) if length > 0 else 0.0)
+        highest = flight.return_height_m if return_m is None else return_m
+        climb = max(0.0, highest - height_m)
+        descent = max(highest, height_m)
+        upright = climb / flight.climb_mps + descent / flight.descent_mps
+        return cls(length, seconds + upright, max(0.0, head / length) if length > 0 else 0.0, upright)
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What a battery leaves, in seconds from now: until the aircraft must be on the ground, and until its search must
+    be over wherever it is; `here_s` is the way home from here, `upright_s` of them climb and descent. With the place
+    where it lands and the wind."""
+
+    ground_s: float
+    search_s: float
+    here_s: float
+    upright_s: float
+    home: LatLon
+    wind: Wind | None = None
+
+    @property
+    def spare_s(self) -> float:
+        """How long the search could go on if it ended as far from home as now."""
+        return min(self.search_s, self.ground_s - self.here_s)
+
+    def after(self, seconds: float) -> Left:
+        """What is left so many seconds later."""
+        return replace(self, ground_s=self.ground_s - seconds, search_s=self.search_s - seconds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +228,15 @@ class Energy:
     percent: float | None
     percent_per_s: float | None
     home: WayHome
+    told: bool = True
+    """The level is what the autopilot tells now, and not counted down from what it told last."""
+    state: str = ""
+    """What the autopilot calls the battery: "low", "critical", ..."""
+    level: float | None = None
+    """As `percent`, reckoned between two whole ones."""
+    wind: Wind | None = None
+    stuck: bool = False
+    """It is not told for all that: what is told stands still."""
 
     def needed(self) -> float | None:
         """Percent of the battery that the way home needs; None while that is not known."""
@@ -170,20 +250,80 @@ class Energy:
         kept = max(needed + flight.reserve_percent, flight.min_battery_percent)
         return max(0.0, (self.percent - kept) / self.percent_per_s)
 
+    def left(self, flown_s: float, home: LatLon, flight: FlightSettings) -> Left | None:
+        """What the battery leaves, by the rule of `objection`; None while its level or its cost is not known.
+
+        Never more than that rule permits: it is asked all the same, and has the last word.
+        """
+        level = self.percent if self.level is None else self.level
+        if level is None or not self.percent_per_s or not math.isfinite(self.home.seconds):
+            return None
+        waits, here = self.home.waits_s, self.home.seconds - self.home.waits_s
+        ground = (level - flight.reserve_percent) / self.percent_per_s - waits
+        search = min((level - flight.min_battery_percent) / self.percent_per_s, flight.max_flight_s - flown_s)
+        return Left(ground, search, here, self.home.upright_s, home, self.wind)
+
     def objection(self, flown_s: float, flight: FlightSettings) -> str:
         """Why the aircraft must fly home now, or nothing; it has been in the air for `flown_s` seconds."""
         if flown_s >= flight.max_flight_s:
             return f"{flown_s:.0f} s in the air"
+        if self.state in _WORN:
+            return f"the autopilot calls the battery {self.state}"
         if self.percent is None:
-            return ""
+            unknown = flown_s > _FIRST_WORD_S and not flight.allow_unknown_battery
+            return "the battery's level is not known" if unknown else ""
         if self.percent <= flight.min_battery_percent:
-            return f"battery at {self.percent:.0f} %"
+            return f"battery at {self.percent:.0f} %{self._reckoned()}"
         needed = self.needed()
         if needed is None or self.percent > needed + flight.reserve_percent:
             return ""
         way = f"the way home, {self.home.length_m:.0f} m"
         if self.home.against_mps >= 0.5:
             way += f" against {self.home.against_mps:.0f} m/s of wind"
+        if self.home.waits_s:
+            way += f" and {self.home.waits_s:.0f} s of waiting until others have landed"
+        battery = f"battery {self.percent:.0f} %{self._reckoned()}"
         if math.isinf(needed):
-            return f"battery {self.percent:.0f} %: {way}, cannot be flown in this wind"
-        return f"battery {self.percent:.0f} %: {way}, needs {needed:.0f} % and {flight.reserve_percent:g} % are kept"
+            return f"{battery}: {way}, cannot be flown in this wind"
+        return f"{battery}: {way}, needs {needed:.0f} % and {flight.reserve_percent:g} % are kept"
+
+    def warning(self) -> str:
+        """What the pilot and the page must know of the level, or nothing."""
+        if self.percent is None:
+            return "the battery's level is not known"
+        if self.told:
+            return ""
+        return f"the battery's level {self._silence}: reckoned to be {self.percent:.0f} %"
+
+    @property
+    def _silence(self) -> str:
+        return "stands still" if self.stuck else "is not told any longer"
+
+    def _reckoned(self) -> str:
+        return "" if self.told else f", reckoned since it {self._silence}"
+
+
+def take_off_objection(t: Telemetry, seconds: float, flight: FlightSettings) -> str:
+    """Why the battery does not let the aircraft take off, or nothing.
+
+    `seconds` is how long the way out and home takes, without any search between.
+    """
+    percent = t.battery_percent
+    if t.battery_state in _WORN:
+        return f"no take-off: the autopilot calls the battery {t.battery_state}"
+    if percent is None:
+        if flight.allow_unknown_battery:
+            return ""
+        return (
+            "no take-off: the battery's level is not known; "
+            "flight.allow_unknown_battery = true in the settings lets it fly all the same"
+        )
+    if percent <= flight.min_battery_percent:
+        return f"no take-off: battery at {percent:.0f} %, and {flight.min_battery_percent:g} % is the least"
+    needed = seconds * cost_per_s(None, flight)
+    if percent <= needed + flight.reserve_percent:
+        return (
+            f"no take-off: battery at {percent:.0f} %, the way out and home needs about {needed:.0f} % "
+            f"and {flight.reserve_percent:g} % are kept"
+        )
+    return ""

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import shapely
 
 from service.config import FlightSettings
+from service.geometry import Metres
 
-Metres = tuple[float, float]
 _CORNERING_M = 10.0  # how far off the line between two cells' centres the aircraft may turn
 _DETOUR_M = 15.0  # how far outside an exclusion a way around it may bend
 _SLACK_M = 2.0

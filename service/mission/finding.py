@@ -1,4 +1,4 @@
-"""From 'this place is probable enough' to the end of the search: found, what then, and what an operator says to it.
+"""From 'this place is probable enough' to the end of the search: found, and what then.
 
 FOUND is a posterior: the most likely place and its neighbours hold `search.found_at` or more, and a hit was reported
 there (or an operator confirmed it). Then `search.on_found` decides: "return" flies home, "hover" waits over the place
@@ -8,90 +8,94 @@ the evidence that it is not there, and a search that had ended for that place go
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterator
 
-from service.evidence.observe import Pose, finite_or_level
-from service.mission.flight import LatLon
+from service.evidence.found import Found
+from service.geometry import distance_m
+from service.mission.effects import Stop, WriteRow
+from service.mission.phase import Find, Happen, Phase, Settle, Wish, say
+from service.mission.standing import Look
 from service.mission.states import Event, State
+from service.rows import FoundRow
 
-if TYPE_CHECKING:
-    from service.mission.mission import Mission
+_ELSEWHERE_M = 10.0  # every look moves the place a little, which the pilot need not hear
 
 
-class Finding:
-    """What a mission does about a found target; `mission.found` is the place, or None."""
+def found_now(look: Look) -> Iterator[Wish]:
+    """See whether the target is found now, which may end the search."""
+    known, found = look.standing.found, look.seen.found
+    yield Find(found)
+    if found is not None and (known is None or (known.lat, known.lon) != (found.lat, found.lon)):
+        yield from tell(found, look, "the posterior passed search.found_at")
 
-    def __init__(
-        self,
-        mission: Mission,
-        *,
-        write: Callable[[str, Mapping[str, object]], Awaitable[None]],
-        tick: Callable[[], Awaitable[None]],
-        energy_low: Callable[[], str],
-    ) -> None:
-        """`write` puts a row into the journal, `tick` waits for the next look at things, `energy_low` says why the
-        aircraft must fly home, or nothing."""
-        self._mission = mission
-        self._write, self._tick, self._energy_low = write, tick, energy_low
-        self._settings = mission.settings
-        self._then = mission.settings.search.on_found
 
-    async def look(self) -> bool:
-        """See whether the target is found now; True when that ends the search."""
-        mission, known = self._mission, self._mission.found
-        found = mission.found = mission.search.found()
-        if found is not None and (known is None or (known.lat, known.lon) != (found.lat, found.lon)):
-            await self._tell("the posterior passed search.found_at")
-        return mission.state == State.FOUND
+def found_after_all(look: Look) -> Iterator[Wish]:
+    """See whether the target is found by what is reported, or said, after the search of a battery: on the way home, and
+    on the ground, where no other sortie need follow then."""
+    standing, known, found = look.standing, look.standing.found, look.seen.found
+    homeward = standing.state == State.RETURNING and standing.why_stopped
+    if not homeward and standing.state != State.GROUNDED:
+        return
+    yield Find(found)
+    if found is None:
+        return
+    at = _at(found)
+    moved_m = math.inf if known is None else distance_m((known.lat, known.lon), (found.lat, found.lon))
+    if moved_m > 0.0:
+        yield WriteRow(FoundRow(found))
+    if moved_m > _ELSEWHERE_M:
+        yield from say(at, look)
+    if standing.state == State.GROUNDED and (
+        look.seen.confirmed or look.settings.search.on_found == "return"
+    ):
+        yield Happen(Event.CONFIRMED, at)
 
-    def hovers(self) -> bool:
-        """Whether to stay here for another look: at a suspect in view, when hovering gives one."""
-        mission = self._mission
-        if self._settings.sensor.hover_look_s == 0.0 or mission.state != State.CONFIRMING:
-            return False
-        t = mission.vehicle.telemetry
-        attitude = (finite_or_level(t.pitch_deg), finite_or_level(t.roll_deg))
-        pose = Pose(t.lat, t.lon, t.alt_home_m, t.heading_deg, t.position_time, *attitude)
-        seen = mission.intake.sensor.footprint(pose)
-        return list(mission.search.place.cell) in seen.cells[seen.counts].tolist()
 
-    async def judge(self, place: LatLon | None, *, confirmed: bool) -> None:
-        """Take in what an operator says about a place, or about the present one."""
-        mission = self._mission
-        present = (mission.found.lat, mission.found.lon) if mission.found else None
-        await mission.intake.judge(mission.search.cell_at(place or present), confirmed=confirmed)
-        said = f"the operator {'confirmed' if confirmed else 'rejected'} the place"
-        if confirmed:
-            mission.found = mission.search.found()
-            await self._tell(said)
-        elif mission.found is not None and mission.search.found() is None:
-            mission.found = None
-            homeward = mission.state == State.RETURNING and not mission.why_stopped
-            ours = mission.vehicle.in_control and mission.vehicle.telemetry.guided
-            if homeward and (mission.autopilot_returns or not ours):
-                await mission.vehicle.enter_guided()
-            if homeward or mission.state == State.FOUND:
-                await mission.happen(Event.REJECTED, said)
+def tell(found: Found, look: Look, why: str) -> Iterator[Wish]:
+    """Write down what was found; it ends the search unless that is to continue and nobody confirmed it."""
+    yield WriteRow(FoundRow(found))
+    if look.seen.confirmed or look.settings.search.on_found != "continue":
+        told = f"{found.lat:.6f}, {found.lon:.6f} p={found.probability:.4f}"  # the 50 characters of one STATUSTEXT
+        yield Happen(Event.CONFIRMED, f"{_at(found)}: {why}", told=told)
 
-    async def wait_over_the_place(self) -> None:
-        """Fly home from what was found, or hover until an operator decides or the energy runs low."""
-        mission = self._mission
-        if self._then == "hover" and mission.search.confirmed is None:
-            await mission.helm.hover(wanted=lambda: mission.state == State.FOUND)
-            while mission.state == State.FOUND and mission.search.confirmed is None:
-                if why := self._energy_low():
-                    mission.why_stopped = why
-                    await mission.happen(Event.ENERGY_LOW, why)
-                await self._tick()
-        if mission.state == State.FOUND:
-            await mission.happen(Event.RETURN, "found: flying home")
 
-    async def _tell(self, why: str) -> None:
-        """Write down what was found; it ends the search unless that is to continue and nobody confirmed it."""
-        mission = self._mission
-        assert mission.found is not None
-        await self._write("found", vars(mission.found))
-        if mission.search.confirmed is not None or self._then != "continue":
-            where = f"{mission.found.lat:.6f}, {mission.found.lon:.6f}, p = {mission.found.probability:.4f}"
-            await mission.happen(Event.CONFIRMED, f"found at {where}: {why}")
+def _at(found: Found) -> str:
+    return f"found at {found.lat:.6f}, {found.lon:.6f}, p = {found.probability:.4f}"
+
+
+def over_for_all(look: Look) -> Iterator[Wish]:
+    """What follows for one of several aircraft that does not search itself when the search is over: it flies no more.
+
+    One that searches sees the same by itself. What its pilot has, or an operator holds, stays so, and is down for good
+    when it is down.
+    """
+    why, standing = look.seen.over, look.standing
+    if not why or standing.settled or standing.flying:
+        return
+    silent = standing.state == State.HOLDING and standing.causes <= {"detector"}
+    if standing.state in (State.WAITING, State.READY, State.TAKEOFF, State.GROUNDED) or silent:
+        yield Happen(Event.FINISH, why, stopped=why, searched=True)
+    else:
+        yield Settle(why)
+
+
+class OverThePlace(Phase):
+    """FOUND: fly home from what was found, or hover until an operator decides or the energy runs low."""
+
+    def __init__(self) -> None:
+        self._stop = True
+
+    def lost(self, look: Look) -> None:
+        """The stop may not have arrived: stop again."""
+        self._stop = True
+
+    def tick(self, look: Look) -> Iterator[Wish]:
+        """Wait, or fly home."""
+        if look.settings.search.on_found != "hover" or look.seen.confirmed:
+            yield Happen(Event.RETURN, "found: flying home")
+        elif why := look.energy_low():
+            yield Happen(Event.ENERGY_LOW, why, stopped=why)
+        elif self._stop:
+            self._stop = False
+            yield Stop()

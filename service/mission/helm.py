@@ -1,260 +1,238 @@
-"""The helm: where the aircraft is, and the one place where a waypoint leaves for it, after every check."""
+"""The helm: everything that speaks against sending the aircraft somewhere, or against flying on.
+
+Pure: telemetry and the time go in, objections come out. What it remembers is where the aircraft was sent last, how
+long things have been the way they are, and the height and the fence that follow from home.
+"""
 
 from __future__ import annotations
 
-import logging
-import math
-from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Sequence
 
-import numpy as np
-import shapely
-
-from service.area import Grid, leads_out, leg_is_clear, way_home
-from service.clock import Clock
 from service.config import Settings
-from service.errors import BadInput
-from service.evidence.observe import grid_heading
-from service.mavlink import LinkError, Vehicle
-from service.mission.fence import Fence, Straying, height_objection
-from service.mission.flight import LatLon
-from service.mission.limits import Lasting, PositionTrust, Progress, wind_objection
-from service.mission.navigator import Cell
+from service.geometry import LatLon
+from service.mavlink.events import Target
+from service.mavlink.target import distance_m
+from service.mavlink.telemetry import Telemetry, Wind
+from service.mission.apart import Other
+from service.mission.chart import Chart, here
+from service.mission.effects import SendWaypoint
+from service.mission.energy import take_off_objection
+from service.mission.fence import Straying
+from service.mission.heights import Heights, Leg
+from service.mission.limits import (
+    Lasting,
+    Objection,
+    PositionTrust,
+    Progress,
+    reference_objection,
+    wind_objection,
+)
+from service.mission.traffic import Traffic
 
-log = logging.getLogger("roisearch")
-TICK_S, RETRY_S = 0.1, 1.0  # how often a mission looks at things, and after what it tries again
-LEAST_PATIENCE_WALL_S = 1.5
 WINDY_S = 5.0
+FAR_M = 50.0
 STRAYED_S = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class NotSent:
-    """Why something was not sent; `cause` is what must pass first: "position", "limits", "link" or "state"."""
-
-    cause: str
-    reason: str
+LOW_S = 1.0
 
 
 class Helm:
-    """Sends waypoints and holds for one mission.
+    """What one aircraft may do now.
 
     Args:
-        may_move: whether the mission's state allows motion now; asked again right before sending.
-        write: writes a row to the journal and returns once it is on disk.
+        name: that of the aircraft, where there are several.
+        fresh_s: how old a position may be.
+        patience_s: how long it may come no nearer to its waypoint.
     """
 
     def __init__(
-        self,
-        settings: Settings,
-        clock: Clock,
-        grid: Grid,
-        vehicle: Vehicle,
-        *,
-        may_move: Callable[[], bool],
-        write: Callable[[str, Mapping[str, object]], Awaitable[None]],
+        self, chart: Chart, settings: Settings, *, fresh_s: float, patience_s: float, name: str = ""
     ) -> None:
-        self.settings, self.clock, self.grid, self.vehicle = settings, clock, grid, vehicle
-        self.frame = grid.frame
-        self.altitude_m = 0.0  # of every waypoint, above sea level; known once home is
-        flight = settings.flight
-        self.trust = PositionTrust(flight, vehicle.settings.position_fresh_s)
-        patience = max(flight.stuck_after_s, LEAST_PATIENCE_WALL_S * clock.speedup)
-        self._progress = Progress(patience, max(flight.corner_m, 0.3 * self.frame.cell_m))
+        self._chart, self._flight = chart, settings.flight
+        self.trust = PositionTrust(settings.flight, fresh_s)
+        near_m = max(settings.flight.corner_m, 0.3 * chart.frame.cell_m)
+        self._progress = Progress(patience_s, near_m)
         self._windy = Lasting(WINDY_S)
         self._strayed, self._straying = Lasting(STRAYED_S), Straying()
+        self._low, self._sinking = Lasting(LOW_S), Straying()
+        self.heights = Heights(chart, settings)
+        self.traffic = Traffic(name, chart, self.heights, settings.flight, fresh_s)
         self._target: LatLon | None = None
         self._on_way = False  # the last waypoint was one of the way to the area or home
-        self._may_move, self._write = may_move, write
+        self._home = chart.grid.launch
+        self._fence = chart.fence(self._home, settings.flight.margin_m)
 
-    def begin(self) -> None:
-        """The vehicle is there, and so is its home: height and fence follow from it."""
-        telemetry, flight, grid = self.vehicle.telemetry, self.settings.flight, self.grid
-        self.altitude_m = telemetry.home_alt_amsl_m + flight.altitude_m
-        bases = [self._metres(grid.launch), self._metres(self.home())]
-        zone, cell_m = grid.keep_out.zone, self.frame.cell_m
-        self._fence = Fence.around(grid.outline, bases, zone, cell_m, flight.margin_m)
+    def reckon(self, t: Telemetry) -> None:
+        """Home may have moved: the height of every waypoint and the fence follow from it."""
+        if not t.position_known:
+            return
+        home = self._chart.home(t)
+        self.heights.reckon(t, home)
+        if home != self._home:
+            self._home, self._fence = home, self._chart.fence(home, self._flight.margin_m)
 
-    # ---- sending -----------------------------------------------------------------------------------------
+    def crosses(self, t: Telemetry) -> bool:
+        """Whether the leg that is flown now leads over, or too near to, an exclusion."""
+        return self._target is not None and not self._chart.leg_allowed(here(t), self._target)
 
-    async def send(self, point: LatLon, *, on_way: bool = False) -> NotSent | None:
-        """Send the aircraft to a point, if nothing speaks against it; else says what does.
+    def regrid(self) -> None:
+        """The ground has changed: the fence follows from it, and who is over an exclusion is on its way out."""
+        self._fence = self._chart.fence(self._home, self._flight.margin_m)
+        self._straying.forget()
 
-        `on_way`: the point is one of the way to the area or home, and not of the search.
-        """
-        if (objection := self.objection(point, on_way=on_way)) is not None:
-            return objection
-        body = {"command": "reposition", "lat": point[0], "lon": point[1], "alt_amsl_m": self.altitude_m}
-        await self._write("command", body)
-        if (
-            objection := self.objection(point, on_way=on_way)
-        ) is not None:  # something happened while the row was written
-            return objection
-        try:
-            self.vehicle.reposition(point[0], point[1], self.altitude_m)
-        except LinkError as error:
-            return NotSent("link", str(error))
-        if self._target is None or self.distance(self._target, point) > 1.0:
+    def unfit(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """Why this aircraft is not the one to begin with, or nothing: it is too far away, or another mission's."""
+        return self.too_far(t) or self.traffic.twin(t, others)
+
+    def too_far(self, t: Telemetry) -> str:
+        """Why the aircraft is too far from where the search is to begin, or nothing."""
+        away, limit = self._from_launch_m(t), self._flight.max_home_distance_m
+        if away <= limit:
+            return ""
+        return f"home is {_metres(away)} from the launch point, more than {_metres(limit)}; is it the right area file?"
+
+    def too_empty(self, t: Telemetry, others: Sequence[Other] = ()) -> str:
+        """Why the battery does not let it take off, for the way out and home and the wait for others, or nothing."""
+        flight, start = self._flight, self._chart.latlon(self._chart.grid.start)
+        way_s = 2.0 * self._chart.distance(here(t), start) / flight.speed_mps
+        height = max(self.heights.highest_return_m([here(t), start]), flight.return_height_m)
+        up_s, down_s = height / flight.climb_mps, height / flight.descent_mps
+        return take_off_objection(t, way_s + up_s + down_s + self.traffic.wait_s(t, others), flight)
+
+    def far(self, t: Telemetry) -> str:
+        """That home is not at the launch point, when a person should know, or nothing."""
+        away = self._from_launch_m(t)
+        return f"home is {_metres(away)} from the launch point" if away > FAR_M else ""
+
+    def _from_launch_m(self, t: Telemetry) -> float:
+        """Metres between home and the launch point, on the ellipsoid: the plane of the grid ends near the area."""
+        (lat, lon), (lat2, lon2) = self._chart.grid.launch, self._chart.home(t)
+        return distance_m(Target(lat, lon, 0.0), Target(lat2, lon2, 0.0))
+
+    def return_m(self, t: Telemetry) -> float:
+        """How high above home the autopilot flies home by itself: as its parameter says, else the settings."""
+        return self._flight.return_height_m if t.return_height_m is None else t.return_height_m
+
+    def returns_clear(self, start: LatLon, t: Telemetry) -> bool:
+        """Whether the autopilot's own return from a place, at the height flown there or the present one if that
+        is lower, is clear of the ground."""
+        up = min(self.heights.up(t), self.heights.home_m + self.heights.over_m(start))
+        clearance = self.heights.return_clearance(start, up, self.return_m(t))
+        return clearance >= self._flight.clearance_m
+
+    def of_the_ground(self, t: Telemetry) -> list[str]:
+        """What a person should know of the ground before a flight."""
+        said = [self.heights.datum_note(), self.heights.return_note(self.return_m(t))]
+        return [each for each in said if each]
+
+    def sent(self, point: LatLon, *, on_way: bool) -> None:
+        """The aircraft has been sent to a point."""
+        if self._target is None or self._chart.distance(self._target, point) > 1.0:
             self._progress.clear()
         self._target, self._on_way = point, on_way
-        return None
-
-    async def hover(self, *, wanted: Callable[[], bool]) -> NotSent | None:
-        """Stop here, if that is still `wanted` when it is sent."""
-        if not wanted():
-            return NotSent("state", "the mission is not to hold any more")
-        if doubts := self.doubts():
-            self.rest()
-            return NotSent("position", "; ".join(doubts))
-        await self._write("command", {"command": "hold"})
-        return self.stop() if wanted() else NotSent("state", "the mission is not to hold any more")
-
-    def stop(self) -> NotSent | None:
-        """Stop here, now. A stop is a waypoint too: none is sent while the position is not trusted."""
-        self.rest()
-        if doubts := self.doubts():
-            return NotSent("position", "; ".join(doubts))
-        try:
-            self.vehicle.hold()
-        except LinkError as error:
-            return NotSent("link", str(error))
-        return None
 
     def rest(self) -> None:
-        """No waypoint is being flown any more, nor sent again."""
-        self.vehicle.stand_by("the mission wants something else now")
+        """No waypoint is being flown any more."""
         self._target = None
         self._progress.clear()
         self._straying.forget()
+        self._sinking.forget()
 
-    # ---- checks ------------------------------------------------------------------------------------------
+    # ---- checks
 
-    def doubts(self) -> list[str]:
-        """Why the position is not to be trusted now."""
-        return self.trust.update(self.vehicle.telemetry, self.clock.now())
+    def doubts(self, t: Telemetry, now: float) -> list[str]:
+        """Why the position is not to be trusted now, or what it is measured from."""
+        contradictions = reference_objection(t, self._flight), self.heights.contradiction(t)
+        return [*self.trust.update(t, now), *(said for said in contradictions if said)]
 
-    def objection(self, point: LatLon, *, on_way: bool) -> NotSent | None:
-        """Why a waypoint must not be sent now, or nothing."""
-        if not self._may_move():
-            return NotSent("state", "the mission is not to move the aircraft")
-        if doubts := self.doubts():
-            return NotSent("position", "; ".join(doubts))
-        where = f"the waypoint {point[0]:.6f}, {point[1]:.6f}"
-        if not self._leg_allowed(point):
-            return NotSent("limits", f"{where} lies behind an excluded area")
-        if outside := self._fence.leg_objection(
-            self._metres(self.here()), self._metres(point), on_way=on_way
-        ):
-            return NotSent("limits", f"{where} {outside}")
-        if height := height_objection(
-            self.altitude_m - self.vehicle.telemetry.home_alt_amsl_m, self.settings.flight
-        ):
-            return NotSent("limits", f"{where} is {height}")
-        limit = self.settings.flight.max_launch_distance_m
-        if self.distance(self.grid.launch, point) > limit:
-            return NotSent("limits", f"{where} is more than {limit:g} m from the launch point")
+    def leg(self, point: LatLon, t: Telemetry, *, on_way: bool = True) -> Leg:
+        """How high to fly to a point, and whether to climb or sink first."""
+        return self.heights.leg(point, t, on_way=on_way)
+
+    def stop_place(self, t: Telemetry) -> LatLon:
+        """Where the aircraft comes to a stand, or as near to that as the search may be."""
+        (lat, lon), (lat2, lon2) = here(t), self.stands(t)
+        for share in (1.0, 0.75, 0.5, 0.25):
+            point = lat + share * (lat2 - lat), lon + share * (lon2 - lon)
+            if self.allows(point):
+                return point
+        return here(t)
+
+    def stands(self, t: Telemetry) -> LatLon:
+        """Where the aircraft comes to a stand if no other target is sent: at its present one, if that is nearer than
+        where a stop that is ordered now would end: its autopilot brakes for that one already, as hard as it must."""
+        stop = self.heights.stop_place(t)
+        near = self._chart.distance(here(t), stop)
+        if self._target is not None and self._chart.distance(here(t), self._target) < near:
+            return self._target
+        return stop
+
+    def objection(self, waypoint: SendWaypoint, t: Telemetry, now: float) -> Objection | None:
+        """Why a waypoint must not be sent now, or nothing. There is no other way for one to the aircraft."""
+        point, on_way = waypoint.point, waypoint.on_way
+        if doubts := self.doubts(t, now):
+            return Objection("position", "; ".join(doubts))
+        chart, where = self._chart, f"the waypoint {point[0]:.6f}, {point[1]:.6f}"
+        if not chart.leg_allowed(here(t), point):
+            return Objection("limits", f"{where} lies behind an excluded area")
+        leg = chart.metres(here(t)), chart.metres(point)
+        if outside := self._fence.leg_objection(*leg, on_way=on_way):
+            return Objection("limits", f"{where} {outside}")
+        stands = self.stands(t)
+        if height := self.heights.objection(point, waypoint.altitude_m, t, on_way=on_way, stands=stands):
+            return Objection("limits" if self.heights.relief is None else "ground", f"{where} {height}")
+        limit = self._flight.max_launch_distance_m
+        if chart.distance(chart.grid.launch, point) > limit:
+            return Objection("limits", f"{where} is more than {limit:g} m from the launch point")
         return None
 
-    def _leg_allowed(self, point: LatLon) -> bool:
-        """Clear of every exclusion, or the straight way out of the one the aircraft has drifted into."""
-        here = self.here()
-        return leg_is_clear(self.grid, here, point) or leads_out(self.grid, here, point)
+    def allows(self, point: LatLon) -> bool:
+        """Whether the search may be over a point: inside the fence, and clear of exclusions."""
+        outside = self._fence.outside_m(self._chart.metres(point), on_way=False)
+        return outside == 0.0 and not self._chart.too_near(point)
 
-    def too_near(self) -> bool:
-        """Over an exclusion, or within its clearance, where no leg of the search may begin."""
-        return bool(shapely.intersects_xy(self.grid.keep_out.zone, *self._metres(self.here())))
-
-    def trouble(self, *, moving: bool) -> NotSent | None:
+    def trouble(self, t: Telemetry, now: float, *, moving: bool) -> Objection | None:
         """What stands against flying on while the autopilot follows our waypoints, or nothing."""
-        doubts = self.doubts()
-        if not self.vehicle.telemetry.guided:
+        doubts = self.doubts(t, now)
+        if not t.guided:
             return None
         if doubts:
-            return NotSent("position", "; ".join(doubts))
+            return Objection("position", "; ".join(doubts))
         if moving and self._target is not None:
-            stuck = self._progress.stuck(self.distance(self.here(), self._target), self.clock.now())
-            return NotSent("progress", stuck) if stuck else None
+            stuck = self._progress.stuck(self._chart.distance(here(t), self._target), now)
+            return Objection("progress", stuck) if stuck else None
         return None
 
-    def too_windy(self) -> str:
+    def too_windy(self, wind: Wind | None, now: float) -> str:
         """Why the wind is too much, once it has lasted, or nothing."""
-        objection = wind_objection(self.vehicle.telemetry, self.settings.flight)
-        return self._windy.after(objection, self.clock.now())
+        return self._windy.after(wind_objection(wind, self._flight), now)
 
-    def strayed(self) -> str:
+    def strayed(self, t: Telemetry, now: float) -> str:
         """Why the aircraft is where it must not be, after it has been where it may, once that has lasted."""
-        here, telemetry = self._metres(self.here()), self.vehicle.telemetry
-        objection = height_objection(telemetry.alt_home_m, self.settings.flight)
-        if away := self._fence.outside_m(here, on_way=self._on_way):
+        objection = self.heights.wrong(t, on_way=self._on_way)
+        place = self._chart.metres(here(t))
+        if away := self._fence.outside_m(place, on_way=self._on_way):
             objection = f"{away:.0f} m outside {self._fence.name(on_way=self._on_way)}"
-        elif shapely.contains_xy(self.grid.keep_out.core, *here):
+        elif self._chart.excluded(here(t)):
             objection = "over an excluded area"
         strayed = self._straying.read(objection)
-        return self._strayed.after(f"the aircraft is {strayed}" if strayed else "", self.clock.now())
+        return self._strayed.after(f"the aircraft is {strayed}" if strayed else "", now)
 
-    def route(self, goal: LatLon) -> list[LatLon]:
-        """The way from here to `goal` around the exclusions; straight there when they leave none."""
-        try:
-            return way_home(self.grid, self.here(), goal)
-        except BadInput as error:
-            log.warning("%s", error)
-            return [goal]
+    def too_low(self, t: Telemetry, now: float) -> str:
+        """Why it is too near to the ground, after it has been clear of it, once that has lasted; or nothing."""
+        low = self._sinking.read(self.heights.low(t))
+        return self._low.after(f"the aircraft is {low}" if low else "", now)
 
-    def heard(self) -> bool:
-        """A heartbeat has come lately."""
-        age = self.clock.now() - self.vehicle.telemetry.heartbeat_time
-        return age < self.vehicle.settings.heartbeat_fresh_s
+    def goes_on(self, t: Telemetry) -> bool:
+        """It has a waypoint that it has not come to yet."""
+        return (
+            self._target is not None and self._chart.distance(here(t), self._target) > self._flight.corner_m
+        )
 
-    # ---- where things are --------------------------------------------------------------------------------
-
-    def here(self) -> LatLon:
-        """The aircraft's position in degrees, as last told."""
-        telemetry = self.vehicle.telemetry
-        return telemetry.lat, telemetry.lon
-
-    def home(self) -> LatLon:
-        """Where the autopilot lands: its home in degrees as told, else the launch point of the area."""
-        home = self.vehicle.telemetry.home
-        return self.grid.launch if home is None else (home.lat, home.lon)
-
-    def under_way(self) -> bool:
+    def under_way(self, t: Telemetry) -> bool:
         """It flies to a waypoint, and is too far from it to brake for it."""
-        flight = self.settings.flight
-        braking = flight.speed_mps**2 / (2.0 * flight.deceleration_mps2) + flight.speed_mps
-        return self._target is not None and self.distance(self.here(), self._target) > braking
+        braking = self._flight.speed_mps**2 / (2.0 * self._flight.deceleration_mps2)
+        return self._target is not None and self._chart.distance(here(t), self._target) > braking
 
-    def cell(self) -> tuple[Cell, bool]:
-        """The cell under the aircraft (the nearest one when it is off the grid), and whether it is on it."""
-        cells, inside = self.frame.locate(np.array([self.here()]))
-        return (int(cells[0, 0]), int(cells[0, 1])), bool(inside[0])
 
-    def heading(self) -> str:
-        """Where its nose points, in the grid's directions."""
-        return grid_heading(self.vehicle.telemetry.heading_deg, self.frame.bearing_deg)
-
-    def latlon(self, cell: Cell) -> LatLon:
-        """The centre of a cell in degrees."""
-        lat, lon = self.frame.to_latlon(np.array([cell]))[0]
-        return float(lat), float(lon)
-
-    def distance(self, here: LatLon, there: LatLon) -> float:
-        """Metres between two positions."""
-        (east, south), (east2, south2) = self.frame.to_metres(np.array([here, there]))
-        return math.hypot(east2 - east, south2 - south)
-
-    def _metres(self, point: LatLon) -> tuple[float, float]:
-        east, south = self.frame.to_metres(np.array([point]))[0]
-        return float(east), float(south)
-
-    def metres_to(self, cell: Cell) -> float:
-        """Metres from the aircraft to the centre of a cell."""
-        return self.distance(self.here(), self.latlon(cell))
-
-    def hovering(self) -> bool:
-        """In the air, armed, in the guided mode."""
-        telemetry = self.vehicle.telemetry
-        return telemetry.landed_state == "in_air" and telemetry.guided and telemetry.armed
-
-    def on_ground(self) -> bool:
-        """On the ground with the motors off."""
-        return not self.vehicle.telemetry.armed and self.vehicle.telemetry.landed_state == "on_ground"
+def _metres(distance: float) -> str:
+    return f"{distance / 1000:.0f} km" if distance >= 10_000.0 else f"{distance:.0f} m"

@@ -1,48 +1,80 @@
-"""The energy of one flight, kept up to date: what the battery costs, what the wind is, and how far home is."""
+"""The way home: ours around what must not be flown over, and over ground that the autopilot's own would meet; then the
+autopilot's own.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
-from service.clock import Clock
-from service.config import FlightSettings
-from service.mission.energy import Consumption, Energy, Metres, WayHome, WindFelt
-from service.mission.flight import LatLon
-from service.mission.helm import Helm
+from service.mission.aside import Aside
+from service.mission.effects import Land, Note, Rest, ReturnToLaunch
+from service.mission.news import Failed, MapChanged, News
+from service.mission.phase import Phase, Turn, Way, Wish, touchdown
+from service.mission.situation import on_ground
+from service.mission.standing import Look
 
-_METRES_PER_DEGREE = 111_194.93
-_MOVED_M = 20.0  # the way home is looked for anew after so many metres
+HOME_AGAIN_S = 5.0  # after which a return to launch that is not flown is ordered again
 
 
-class Homeward:
-    """Looks at the vehicle whenever `update` is called, several times a second."""
+class Homeward(Phase):
+    """RETURNING."""
 
-    def __init__(self, helm: Helm, clock: Clock, flight: FlightSettings) -> None:
-        self._helm, self._clock, self._flight = helm, clock, flight
-        self._consumption, self._wind = Consumption(), WindFelt(flight)
-        self._route: list[LatLon] = []
-        self._routed_from: LatLon = (math.inf, math.inf)
-        self.energy = Energy(None, None, WayHome(0.0, 0.0, 0.0))
+    def __init__(self) -> None:
+        self._way: Way | None = None
+        self._ordered = -math.inf
+        self._begun = self._resting = self._lands = False
+        self._turn = Turn()
+        self._aside = Aside()
 
-    def update(self) -> None:
-        """Take in what the vehicle tells now; nothing on the ground, or while the position is not known."""
-        t, now = self._helm.vehicle.telemetry, self._clock.now()
-        if t.landed_state != "in_air" or not t.position_known:
-            return
-        if t.battery_percent is not None:
-            self._consumption.update(t.battery_percent, now)
-        north, east, _ = t.velocity_ned_mps
-        wind = self._wind.update(t.wind, (east, north), self._helm.under_way(), now)
-        home = WayHome.along(self._way(), t.alt_home_m, wind, self._flight)
-        self.energy = Energy(t.battery_percent, self._consumption.percent_per_s, home)
+    def lost(self, look: Look) -> None:
+        """The last point may not have arrived."""
+        if self._way is not None:
+            self._way.lost(look)
 
-    def _way(self) -> list[Metres]:
-        """From here home around the exclusions, as (east, north) of here in metres."""
-        here = self._helm.here()
-        if not self._route or self._helm.distance(here, self._routed_from) > _MOVED_M:
-            self._route, self._routed_from = self._helm.route(self._helm.home()), here
-        narrowing = math.cos(math.radians(here[0]))
-        return [
-            ((lon - here[1]) * narrowing * _METRES_PER_DEGREE, (lat - here[0]) * _METRES_PER_DEGREE)
-            for lat, lon in (here, *self._route)
-        ]
+    def on(self, news: News, look: Look) -> Iterator[Wish]:
+        """A point that was not sent is tried again; where the autopilot does not know the way home, it lands."""
+        if self._way is not None:
+            self._way.on(news, look)
+        if isinstance(news, Failed) and isinstance(news.action, ReturnToLaunch):
+            self._lands = bool(look.helm.doubts(look.seen.telemetry, look.now))
+        if isinstance(news, MapChanged) and not self._resting:
+            self._begun, self._way = False, None  # another way may be free
+        yield from ()
+
+    def tick(self, look: Look) -> Iterator[Wish]:
+        """Fly around, then let the autopilot land; with other aircraft in the air all the way is flown by us, in our
+        own layer, and only the landing leaves it."""
+        t = look.seen.telemetry
+        if not self._begun:
+            self._begun = True
+            stands = bool(look.seen.others) and on_ground(
+                t
+            )  # it has waited to take off, and need not any more
+            if t.guided and not look.standing.direct and not stands:
+                points = look.chart.route((t.lat, t.lon), look.chart.home(t))
+                if not look.seen.others and look.helm.returns_clear([(t.lat, t.lon), *points][-2], t):
+                    points = points[:-1]  # from there the autopilot flies
+                self._way = Way(points, climb=bool(points))
+        if self._way is not None and (place := self._aside.place(look)) is not None:
+            yield Note(f"makes room for the others at {place[0]:.6f}, {place[1]:.6f}")
+            self._way = Way([place, *look.chart.route(place, look.chart.home(t))], climb=False)
+        if self._way is not None:
+            yield from self._way.tick(look)
+            if not self._way.flown:
+                return
+        if not self._resting and t.guided and t.armed and not look.standing.direct:
+            why = look.helm.traffic.landing(t, look.seen.others, look.now)
+            yield from self._turn.wait(why, "to land", look)
+            if why:
+                return
+        if not self._resting:  # the autopilot steers from here: it need not come nearer to a waypoint of ours
+            self._resting = True
+            yield Rest()
+        if not t.armed:
+            yield touchdown(look, "on the ground, disarmed")
+        elif not look.busy and (
+            self._ordered < 0.0 or (t.guided and look.now - self._ordered > HOME_AGAIN_S)
+        ):
+            self._ordered = look.now
+            yield Land() if self._lands else ReturnToLaunch()

@@ -11,14 +11,24 @@ from collections import deque
 from dataclasses import dataclass
 
 from service.config import FlightSettings
-from service.mavlink.events import Target
-from service.mavlink.target import distance_m
-from service.mavlink.telemetry import Telemetry
+from service.geometry import distance_m, moved
+from service.mavlink.telemetry import Telemetry, Wind
 
-_METRES_PER_DEGREE = 111_194.93
 _FIX_3D = 3
 _MARGIN_S = 1.5  # the vehicle tells its health once a second: so long may it have been bad unnoticed
 _REMEMBERED = 100
+_GPS_MESSAGES = frozenset({"GPS_RAW_INT", "GPS2_RAW"})
+_HEALTH_MESSAGES = frozenset({"ESTIMATOR_STATUS", "EKF_STATUS_REPORT", "SYS_STATUS"})
+_GOOD_EPH, _GOOD_ACCURACY_M = 2.0, 5.0  # as good as enough satellites, where the receiver does not count them
+
+
+@dataclass(frozen=True, slots=True)
+class Objection:
+    """Why something must not be sent; `cause` is what must pass first: "position", "limits", "ground", "link",
+    "apart" (from the other aircraft) or "state"."""
+
+    cause: str
+    reason: str
 
 
 def position_objections(t: Telemetry, flight: FlightSettings, fresh_s: float) -> list[str]:
@@ -27,18 +37,48 @@ def position_objections(t: Telemetry, flight: FlightSettings, fresh_s: float) ->
     The age is counted up to the last heartbeat: when that stays away too, the link is lost, and not the position.
     `fresh_s` seconds is the most that it may be. `flight.min_satellites` of 0 asks for no GPS at all.
     """
-    objections = []
+    objections: list[str] = []
     age = t.heartbeat_time - t.position_time
     if age > fresh_s:
         objections.append(f"no new position for {age:.0f} s" if math.isfinite(age) else "no position")
     if flight.min_satellites > 0:
-        if t.fix < _FIX_3D:
-            objections.append("the GPS has no 3D fix")
-        elif t.satellites is not None and t.satellites < flight.min_satellites:
-            objections.append(f"the GPS has {t.satellites} satellites, fewer than {flight.min_satellites}")
+        objections.append(_gps_objection(t, flight))
+    objections.append(_health_objection(t))
+    return [objection for objection in objections if objection]
+
+
+def _gps_objection(t: Telemetry, flight: FlightSettings) -> str:
+    if t.fix < _FIX_3D:
+        return "the GPS is not heard any longer" if t.old & _GPS_MESSAGES else "the GPS has no 3D fix"
+    if t.satellites is not None:
+        few = t.satellites < flight.min_satellites
+        return f"the GPS has {t.satellites} satellites, fewer than {flight.min_satellites}" if few else ""
+    accurate = t.horizontal_accuracy_m is not None and t.horizontal_accuracy_m <= _GOOD_ACCURACY_M
+    if accurate or (t.eph is not None and t.eph <= _GOOD_EPH):
+        return ""
+    return "the GPS tells neither its satellites nor how accurate it is"
+
+
+def _health_objection(t: Telemetry) -> str:
+    """The estimator's own word and that of SYS_STATUS; what was told, and is not any longer, is no good word."""
     if t.estimator_ok is False:
-        objections.append("the autopilot's position estimate is not healthy")
-    return objections
+        return "the autopilot's position estimate is not healthy"
+    if t.sensors_failed:
+        return f"the autopilot calls not healthy: {', '.join(t.sensors_failed)}"
+    if t.estimator_ok is None and (silent := t.old & _HEALTH_MESSAGES):
+        return f"the health of the autopilot's position estimate is not told any longer ({', '.join(sorted(silent))})"
+    return ""
+
+
+def reference_objection(t: Telemetry, flight: FlightSettings) -> str:
+    """Why heights must not be trusted now, or nothing: HOME_POSITION and the position's two altitudes say how high home
+    lies above the sea, and have to say the same."""
+    if t.home is None or not t.position_known:
+        return ""
+    said = t.home_alt_amsl_m + t.home_lifted_m
+    if abs(t.home.alt_amsl_m - said) <= flight.max_jump_m:
+        return ""
+    return f"home is {t.home.alt_amsl_m:.0f} m above the sea as told, and {said:.0f} m as the position says"
 
 
 def hold_objection(held_s: float, flight: FlightSettings) -> str:
@@ -46,11 +86,11 @@ def hold_objection(held_s: float, flight: FlightSettings) -> str:
     return f"hovered for {held_s:.0f} s" if held_s > flight.max_hold_s else ""
 
 
-def wind_objection(t: Telemetry, flight: FlightSettings) -> str:
-    """Why the wind is too much, or nothing; an autopilot that does not tell the wind has none."""
-    if t.wind is None or t.wind.speed_mps <= flight.max_wind_mps:
+def wind_objection(wind: Wind | None, flight: FlightSettings) -> str:
+    """Why the wind is too much, or nothing; one that is not known (None) is told elsewhere, and no objection."""
+    if wind is None or wind.speed_mps <= flight.max_wind_mps:
         return ""
-    return f"wind of {t.wind.speed_mps:.0f} m/s, more than {flight.max_wind_mps:g} m/s"
+    return f"wind of {wind.speed_mps:.0f} m/s, more than {flight.max_wind_mps:g} m/s"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +117,7 @@ def jump_m(before: Sample, after: Sample) -> float:
     seconds = after.boot_s - before.boot_s
     north = 0.5 * (before.north_mps + after.north_mps) * seconds
     east = 0.5 * (before.east_mps + after.east_mps) * seconds
-    narrowing = max(math.cos(math.radians(before.lat)), 1e-6)
-    lat = before.lat + north / _METRES_PER_DEGREE
-    lon = before.lon + east / (_METRES_PER_DEGREE * narrowing)
-    return distance_m(Target(lat, lon, 0.0), Target(after.lat, after.lon, 0.0))
+    return distance_m(moved((before.lat, before.lon), east, north), (after.lat, after.lon))
 
 
 class PositionTrust:

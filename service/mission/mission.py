@@ -1,449 +1,411 @@
-"""The mission: one search, from the first heartbeat to the ground.
+"""The mission's shell: feeds the core with what happens, carries out what it wants, and decides nothing.
 
-`Mission.run` goes through the phases; a `Watch` beside it listens to the vehicle. Both change the state only through
-`happen`, which looks the table of `states` up, journals the transition and tells the pilot. A guard looks ten times a
-second at what `limits` objects to. Every waypoint passes the helm, which asks for a state that may move, a position to
-trust and a leg that is clear, and writes it to the journal before it goes out.
+What the core wants at once is done at once, in the same call in which it was told: from a pilot's mode change to the
+silence that it asks for nothing is awaited. An action waits until all rows before it are on disk; a waypoint is then
+shown to the core once more, and sent in the same call in which that has nothing against it.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import functools
 import logging
-import math
-import sqlite3
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 
-from roisearch import Decision
+from roisearch import SearchState
 from service.clock import Clock
-from service.config import Settings
-from service.evidence.intake import Intake, JournalLost
-from service.evidence.observe import Observation
-from service.evidence.suspects import Found
+from service.evidence.found import Found
+from service.evidence.intake import Intake
+from service.evidence.observe import FramePose, Observation
+from service.evidence.reports import OrderReceipt
+from service.geometry import Cell, LatLon
 from service.journal import Journal
+from service.known import Withdrawn
 from service.mavlink import LinkError, Vehicle
-from service.mission.departure import Departure
-from service.mission.finding import Finding
-from service.mission.flight import Flight, LatLon
-from service.mission.helm import RETRY_S, TICK_S, Helm
-from service.mission.holds import Holds
-from service.mission.homeward import Homeward
-from service.mission.navigator import Cell, Navigator
-from service.mission.states import FINAL, FLYING, MAY_MOVE, MOVING, Event, State, next_state
-from service.mission.watch import Watch
+from service.mission.apart import Other
+from service.mission.core import MissionCore
+from service.mission.doing import do
+from service.mission.effects import (
+    Action,
+    Answer,
+    Brake,
+    DropAction,
+    DropThought,
+    Effect,
+    ForgetAircraft,
+    Land,
+    Learn,
+    LetGo,
+    Note,
+    PlanAnew,
+    Reckon,
+    Rest,
+    ReturnToLaunch,
+    SendWaypoint,
+    Stop,
+    Tell,
+    Think,
+    WriteRow,
+)
+from service.mission.energy import Energy
+from service.mission.flight import Flight
+from service.mission.formation import Formation
+from service.mission.limits import Objection
+from service.mission.news import (
+    Done,
+    Failed,
+    Hit,
+    Judged,
+    MapChanged,
+    News,
+    NotSent,
+    NotStopped,
+    Order,
+    Thought,
+)
+from service.mission.orders import STOPPING
+from service.mission.outlook import Outlook, pose_at
+from service.mission.situation import Situation
+from service.mission.standing import Standing
+from service.mission.states import FINAL, State
+from service.mission.tickets import Tickets
+from service.mission.written import WrittenRows
+from service.news.bearing import FieldNews
+from service.reasons import Reason
+from service.rows import OrderRow
 from service.search import Search
-from service.view.reasons import Reason
 
 log = logging.getLogger("roisearch")
+TICK_S = 0.1
 LEAVING_S = 5.0
-HOME_AGAIN_S = 5.0  # after which a return to launch that is not flown is ordered again
-_CRITICAL = 2  # MAV_SEVERITY
-SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
+MOVING_ORDERS, JUDGING = ("resume", "launch"), ("confirm", "reject")
+_OVERTAKEN = (
+    "the aircraft was stopped or taken over before it was carried out; order it again if it is wanted"
+)
+UNWRITTEN = (ReturnToLaunch, Land)
+MakeIntake = Callable[[Callable[[float], FramePose | None], Callable[[Observation, float], None]], Intake]
+
+
+@dataclass(frozen=True)
+class Stopwatch:
+    """Who is told the seconds of a decision, and those from a hit's report to its waypoint on the wire."""
+
+    decision: Callable[[float], None] = lambda seconds: None
+    hit_to_waypoint: Callable[[float], None] = lambda seconds: None
 
 
 class Mission:
-    """One search with one vehicle."""
+    """One search with one vehicle, under way.
+
+    Args:
+        make_intake: makes the intake from where the aircraft was at a time, and from who is told of an observation.
+        formation: who flies the search beside it; by default nobody.
+        stopwatch: is told what took how long.
+    """
 
     def __init__(
         self,
+        core: MissionCore,
         *,
-        settings: Settings,
         clock: Clock,
         search: Search,
         vehicle: Vehicle,
         journal: Journal,
-        intake: Intake,
-        may_take_off: bool,
-        sent: Callable[[float], None] = lambda seconds: None,
-        thought: Callable[[float], None] = lambda seconds: None,
+        make_intake: MakeIntake,
+        formation: Formation | None = None,
+        stopwatch: Stopwatch | None = None,
     ) -> None:
-        """`sent` is told the seconds from a hit's report to its waypoint on the wire, `thought` those of a decision."""
-        self.settings, self.clock, self.search = settings, clock, search
-        self.vehicle, self.journal, self.intake = vehicle, journal, intake
-        self.may_take_off = may_take_off
-        self._sent, self._thought = sent, thought
-        self.frame = search.grid.frame
-        self.state = State.WAITING
-        self.flight = Flight()
-        self.found: Found | None = None
-        self.reason = Reason("waiting for the aircraft")
-        self.path: tuple[Cell, ...] = ()
-        self.why_here = ""  # the reason of the last transition
-        self.why_stopped = ""
-        self.searched = False  # the search ended because there was nothing more to gain, not by an order
-        self.resend = False  # the last waypoint or stop may have been lost: `Watch` says so
-        self.autopilot_returns = False  # the return to launch was ordered: it flies by itself now, or soon
-        self._hovering = False  # over a suspect, for another look
-        fly = settings.flight
-        self._navigator = Navigator(self.frame.cell_m, fly.speed_mps, fly.deceleration_mps2, fly.corner_m)
-        self._thinking: asyncio.Task[Decision] | None = None
-        self._hit_at: float | None = None
-        self._last_cell: Cell | None = None
-        self._changed = asyncio.Event()
-        self._wake = asyncio.Event()
+        self.core, self.clock, self.search = core, clock, search
+        self.vehicle, self.journal = vehicle, journal
+        self.intake = make_intake(partial(pose_at, vehicle, core), self.observed)
+        formation = formation or Formation()
+        self._outlook = Outlook(core, clock, search, vehicle, journal, self.intake, formation)
+        self._rows = WrittenRows(journal, clock, search.aircraft)
+        self._tickets = Tickets()
+        self._stopwatch = stopwatch or Stopwatch()
+        self._acting: asyncio.Task[None] | None = None
+        self._thinking: asyncio.Task[None] | None = None
+        self._stopped = False
         self._group = asyncio.TaskGroup()
-        self.departure = Departure(self, write=self._write)
-        self.holds = Holds(self, tick=self._tick, energy_low=self._energy_low)
-        self.finding = Finding(self, write=self._write, tick=self._tick, energy_low=self._energy_low)
-        self.helm = Helm(settings, clock, search.grid, vehicle, may_move=self._may_move, write=self._write)
-        self.homeward = Homeward(self.helm, clock, fly)
-        self.watch = Watch(self, write=self._write)
+        formation.join(search.aircraft, self.told)
 
-    # ---- state -------------------------------------------------------------------------------------------
+    # ---- what can be seen of it
 
-    async def happen(self, event: Event, reason: str) -> bool:
-        """Let an event happen; True when it changed the state. The change is on disk when this returns."""
-        before, after = self.state, next_state(self.state, event)
-        if before == after:
-            return False
-        self.state, self.why_here = after, reason
-        self.holds.entered(after, self.clock.now())
-        self.autopilot_returns = False
-        if after in FLYING and before not in FLYING:
-            self.why_stopped, self.searched = "", False
-        if not (before in FLYING and after in FLYING):
-            self.helm.rest()
-            self.resend = False
-        if after == State.YIELDED:
-            self.vehicle.release_control(reason)
-        elif after == State.DONE:
-            self.flight.ended = self.clock.now()
-        self._changed.set()
-        self._drop_thought()
-        log.info("%s → %s: %s", before, after, reason)
-        body = {"from": before, "event": event, "to": after, "reason": reason}
-        await self._write("transition", body)
-        self.vehicle.status_text(f"search {after}: {reason}")
-        return True
+    @property
+    def name(self) -> str:
+        """The name of its aircraft; empty for the only one."""
+        return self.search.aircraft
 
-    async def hold(self, cause: str, reason: str) -> None:
-        """Hover until `cause` is gone; several causes can hold at once."""
-        self.holds.causes.add(cause)
-        if await self.happen(Event.HOLD, reason):
-            refusal = await self.helm.hover(wanted=lambda: self.state == State.HOLDING)
-            if refusal is not None:
-                log.warning("no hold was sent: %s", refusal.reason)
-                self.resend = refusal.cause == "link"
+    @property
+    def called(self) -> str:
+        """What a line that is about it begins with; nothing for the only one."""
+        return f"aircraft '{self.name}': " if self.name else ""
 
-    async def leave(self, reason: str, *, stop: bool = True) -> None:
-        """End the run where it is, for a fault that it cannot go on with or on a signal.
+    @property
+    def standing(self) -> Standing:
+        """How it stands."""
+        return self.core.standing
 
-        Stops the aircraft, if it is ours and `stop`, and tells the pilot, who has it now.
-        """
-        before, self.state = self.state, State.ABORTED
-        self.why_stopped = reason
-        self._drop_thought()
-        hovers = stop and not self.helm.on_ground() and self.helm.stop() is None
-        said = self.vehicle.status_text(
-            f"search ABORTED{', hovering' if hovers else ''}: {reason}", _CRITICAL
-        )
-        if self.journal.failed is None:
-            body = {"from": before, "event": Event.ABORT, "to": self.state, "reason": reason}
-            with contextlib.suppress(JournalLost):
-                await self._write("transition", body)
-        if said and hovers:
-            await self.clock.sleep(LEAVING_S)  # a stop that is lost is sent again
+    @property
+    def state(self) -> State:
+        """Its state."""
+        return self.core.standing.state
 
-    async def order(self, command: str, place: LatLon | None = None) -> str:
-        """An operator's order: hold, resume, return or abort; confirm or reject a place, the present one unless
-        given. Returns the state that came of it."""
-        await self._write("order", {"command": command, "state": self.state, "place": place})
-        try:
-            if command in ("confirm", "reject"):
-                await self.finding.judge(place, confirmed=command == "confirm")
-            else:
-                await self._obey(command)
-        except LinkError as error:
-            log.warning("%s: %s", command, error)
-            self.vehicle.status_text(f"search {self.state}: {command} failed: {error}")
-        return self.state.value
+    @property
+    def found(self) -> Found | None:
+        """The place that counts as found."""
+        return self.core.standing.found
 
-    async def _obey(self, command: str) -> None:
-        ours = self.vehicle.in_control and self.vehicle.telemetry.guided and not self.autopilot_returns
-        if command == "hold":
-            if self.state == State.RETURNING and not ours:  # the autopilot flies home by itself
-                await self.vehicle.enter_guided()
-            await self.hold("operator", "the operator asked")
-        elif command == "resume":
-            if self.state in (State.YIELDED, State.HOLDING) and not ours:
-                await self.vehicle.enter_guided()
-            await self.happen(Event.RESUME, "the operator asked")
-        elif command == "return":
-            if self.state == State.YIELDED:
-                await self.vehicle.enter_guided()
-            if await self.happen(Event.RETURN, "the operator asked"):
-                self.why_stopped = self.why_stopped or "the operator asked to return"
-        elif command == "abort":
-            self.why_stopped = "the operator aborted the run"
-            await self.happen(Event.ABORT, "the operator asked")
+    @property
+    def flight(self) -> Flight:
+        """What was flown."""
+        return self.core.flight
 
-    def _may_move(self) -> bool:
-        return self.state in MAY_MOVE
+    @property
+    def reason(self) -> Reason:
+        """Why it goes where it goes."""
+        return self.core.reason
+
+    @property
+    def energy(self) -> Energy:
+        """The battery, and what the way home needs of it."""
+        return self.core.reserve.energy
 
     def flight_time(self) -> float:
         """Seconds in the air so far."""
-        return (self.flight.ended or self.clock.now()) - self.flight.began if self.flight.began else 0.0
+        return self.flight.seconds(self.clock.now())
+
+    def heard(self) -> bool:
+        """A heartbeat has come lately."""
+        age = self.clock.now() - self.vehicle.telemetry.heartbeat_time
+        return age < self.core.terms.heartbeat_fresh_s
+
+    def cell(self) -> Cell:
+        """The cell under the aircraft, the nearest one when it is off the grid."""
+        return self.core.chart.cell(self.vehicle.telemetry)[0]
+
+    def heading(self) -> str:
+        """Where its nose points, in the grid's directions."""
+        return self.core.chart.heading(self.vehicle.telemetry)
+
+    def told(self) -> Other:
+        """This aircraft as the others are to see it."""
+        return self.core.told(Situation(self.vehicle.telemetry), self.clock.now())
 
     def ahead(self) -> list[LatLon]:
-        """Where the aircraft goes from here as decided: its waypoint and the path beyond; empty when it does not."""
-        if self.state not in FLYING:
-            return []
-        return [
-            self.helm.here(),
-            *(self.helm.latlon(cell) for cell in (self._navigator.waypoint, *self.path)),
-        ]
+        """Where the aircraft goes from here as decided; empty when it does not."""
+        return self.core.ahead(self._outlook.situation())
 
-    # ---- phases ------------------------------------------------------------------------------------------
+    # ---- what happens
 
     async def run(self) -> None:
         """Fly the whole mission; returns when the state is final."""
         async with self._group as group:
-            jobs = (self.watch.run(), self._guard(), self._keep_track())
-            watchers = [group.create_task(job) for job in jobs]
+            listening = group.create_task(self._listen())
             try:
-                await self.departure.get_ready()
                 while self.state not in FINAL:
-                    await self._phase()
+                    if self._rows.lost is not None:
+                        raise self._rows.lost
+                    self._carry_out(self.core.tick(self._outlook.situation(), self.clock.now()))
+                    await self.clock.sleep(TICK_S)
             finally:
                 self._drop_thought()
-                for watcher in watchers:
-                    watcher.cancel()
+                self._drop_action()
+                listening.cancel()
+        await self._linger()
 
-    async def _phase(self) -> None:
-        """Do what the state asks for until the state changes."""
-        self._changed.clear()
-        if self.state in FLYING:
-            await self._search()
-        elif self.state == State.FOUND:
-            await self.finding.wait_over_the_place()
-        elif self.state == State.RETURNING:
-            await self._go_home()
-        elif self.state == State.HOLDING:
-            await self.holds.wait_out()
-        else:
-            await self._changed.wait()
+    async def order(
+        self, command: str, place: LatLon | None = None, system_id: int | None = None
+    ) -> OrderReceipt:
+        """An operator's order: hold, resume, return, launch, replace (by the aircraft with `system_id`, or any), finish
+        or abort; confirm or reject a place, the present one unless given. Returns the state that came of it, and why it
+        was refused if it was."""
+        if why := self._no_place(command, place):
+            return OrderReceipt(state=self.state, refused=why)
+        row = OrderRow(command, self.state, place)
+        if command not in STOPPING:
+            before = self.core.overtaken
+            await self._rows.on_disk(row)
+            if command in MOVING_ORDERS and self.core.overtaken != before:  # the later word counts
+                return OrderReceipt(state=self.state, refused=_OVERTAKEN)
+        if command in JUDGING:
+            confirmed = command == "confirm"
+            present = (self.found.lat, self.found.lon) if self.found else None
+            await self.intake.judge(self.search.cell_at(place or present), confirmed=confirmed)
+            return await self.judged(confirmed=confirmed)
+        ticket, done = self._tickets.draw()
+        self._feed(Order(command, ticket, system_id))
+        if command in STOPPING:
+            self._rows.write(row)
+        refused = await done
+        return OrderReceipt(state=self.state, refused=refused or None)
 
-    async def _search(self) -> None:
-        """Fly from decision to decision until something else is to be done."""
-        if not self.flight.began:
-            self.flight.began = self.clock.now()
-        await self._command(
-            "speed", functools.partial(self.vehicle.set_speed, self.settings.flight.speed_mps)
-        )
-        here, inside = self.helm.cell()
-        start = self.search.nearest_flyable(here)
-        if self.state in FLYING and (not inside or start != here or self.helm.too_near()):
-            await self._fly_route(start)
-        self.intake.last_at = self.clock.now()
-        self._navigator.interrupt(start, self.helm.heading())
-        while self.state in FLYING:
-            await self._look_for_the_end()
-            if self.state in FLYING:
-                await self._steer()
-            await self._tick()
+    def _no_place(self, command: str, place: LatLon | None) -> str:
+        """Why there is no place that a person's word could be about, or nothing."""
+        if place is not None:
+            return self.search.why_not_here(place)
+        there = self.found is not None or self.search.was_hit(self.search.place)
+        return "" if there or command not in JUDGING else f"nothing was seen yet: name the place to {command}"
 
-    async def _look_for_the_end(self) -> None:
-        """Found, searched enough, or nobody looking?"""
-        settings, place = self.settings, self.search.place
-        if await self.finding.look():
-            return
-        if place.probability >= SUSPECT_AT:
-            await self.happen(Event.SUSPECT, f"a place with probability {place.probability:.0%}")
-        elif place.probability < CLEARED_BELOW:
-            await self.happen(Event.CLEARED, "nothing there")
-        enough = settings.search.stop_at_pos * self.search.grid.reachable_mass
-        if self.search.record.searched >= enough and self.state == State.SEARCHING:
-            self.why_stopped = f"searched to POS {self.search.record.searched:.1%}"
-            await self._stop_searching(Event.SEARCHED)
-        elif self.flight.steps >= settings.search.max_steps:
-            self.why_stopped = f"{self.flight.steps} steps flown"
-            await self._stop_searching(Event.SEARCHED)
-        elif self.holds.detector_silent():
-            log.warning("no detector report for %.0f s: hovering", settings.sensor.silent_after_s)
-            await self.hold("detector", "the detector is silent")
+    async def judged(self, *, confirmed: bool) -> OrderReceipt:
+        """An operator has confirmed or rejected a place, and the belief knows it; what comes of that."""
+        ticket, done = self._tickets.draw()
+        self._feed(Judged(confirmed, self.search.found(), ticket))
+        refused = await done
+        return OrderReceipt(state=self.state, refused=refused or None)
 
-    def _energy_low(self) -> str:
-        """Why the aircraft must fly home now, or nothing."""
-        return self.homeward.energy.objection(self.flight_time(), self.settings.flight)
+    async def hear(self, said: FieldNews | Withdrawn) -> None:
+        """News from the field, or news taken back; the next decision knows. Raises JournalLost."""
+        await self.intake.hear(said)
+        self.map_changed()
 
-    async def _stop_searching(self, event: Event) -> None:
-        self.searched = True
-        await self.happen(event, self.why_stopped)
-
-    async def _steer(self) -> None:
-        """One tick: note progress, think when it is time, send the next waypoint when it is due."""
-        navigator, telemetry = self._navigator, self.vehicle.telemetry
-        here, inside = self.helm.cell()
-        if inside and here != self._last_cell:
-            self.flight.steps += self._last_cell is not None
-            self._last_cell = here
-            navigator.entered(here)
-        speed = telemetry.ground_speed_mps
-        remaining = self.helm.metres_to(navigator.waypoint)
-        if self._thinking is not None and self._thinking.done():
-            decision, self._thinking = self._thinking.result(), None
-            navigator.decide(decision.path)
-            await self._decided(decision)
-        if self.finding.hovers():
-            if not self._hovering:
-                self._hovering = True
-                self._drop_thought()
-                await self.helm.hover(wanted=lambda: self.state in FLYING)
-            return
-        if self._hovering:
-            self._hovering = False
-            navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
-        thinking_s = self.settings.search.deadline_s * self.clock.speedup
-        if self._thinking is None and navigator.wants_decision(remaining, thinking_s):
-            unseen = [cell for cell in navigator.ahead if cell not in self.intake.passes]
-            self._thinking = asyncio.create_task(
-                self.search.decide(navigator.waypoint, navigator.heading, unseen)
-            )
-            self._thinking.add_done_callback(lambda _: self._wake.set())
-        target = navigator.due(remaining, speed)
-        if self.resend or (target is not None and not await self._send(self.helm.latlon(target))):
-            await self.clock.sleep(RETRY_S)
-            self.resend = False
-            self._drop_thought()  # it begins where the aircraft does not go now
-            here, _ = self.helm.cell()
-            navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
-        elif target is not None and self._hit_at is not None:
-            self.flight.latencies_s.append(time.perf_counter() - self._hit_at)
-            self._sent(self.flight.latencies_s[-1])
-            self._hit_at = None
+    def map_changed(self) -> None:
+        """What is known of the ground has changed, by another way than a look."""
+        self._feed(MapChanged(self.search.grid))
 
     def observed(self, observation: Observation, arrived: float) -> None:
-        """An observation was applied (called by the intake): a hit asks for a new decision at once."""
-        if not observation.speaking:
-            return
-        for lat, lon in self.frame.to_latlon(observation.speaking):
-            self.flight.hits.append((float(lat), float(lon)))
-        if self.state in FLYING:
-            self._drop_thought()
-            here, _ = self.helm.cell()
-            self._navigator.interrupt(self.search.nearest_flyable(here), self.helm.heading())
-            self._hit_at = arrived
-            self._wake.set()
+        """An observation was applied (called by the intake)."""
+        if observation.speaking:
+            places = self.search.grid.frame.to_latlon(observation.speaking)
+            self._feed(Hit(tuple((float(lat), float(lon)) for lat, lon in places), arrived))
 
-    # ---- home --------------------------------------------------------------------------------------------
+    async def leave(self, reason: str, *, stop: bool = True, home: bool = False) -> None:
+        """End the run where it is, for a fault that it cannot go on with or on a signal; `home`: an aircraft of ours is
+        not left hovering, its autopilot brings it home."""
+        seen = self._outlook.situation()
+        self._carry_out(self.core.leave(reason, seen, self.clock.now(), stop=stop, home=home))
+        if home and seen.telemetry.in_control and seen.telemetry.landed_state != "on_ground":
+            try:
+                await self.vehicle.return_to_launch()
+                self._stopped = False
+            except LinkError as error:
+                log.error("%s", error)
+                self.vehicle.status_text(f"search ABORTED, hovering: {error}", 2)
+        await self._linger()
 
-    async def _go_home(self) -> None:
-        """Fly home around what must not be flown over, then let the autopilot land."""
-        if self.vehicle.telemetry.guided and not self.holds.direct:
-            for point in self.helm.route(self.helm.home())[:-1]:
-                if not await self._fly_to(point):
-                    return
-        self.helm.rest()  # from here the autopilot steers: it need not come nearer to a waypoint of ours
-        ordered = -math.inf
-        while self.state == State.RETURNING:
-            now, telemetry = self.clock.now(), self.vehicle.telemetry
-            if not telemetry.armed:
-                await self.happen(Event.LANDED, "on the ground, disarmed")
-            elif ordered < 0.0 or (telemetry.guided and now - ordered > HOME_AGAIN_S):
-                ordered, self.autopilot_returns = now, True
-                await self._command("return to launch", self.vehicle.return_to_launch)
+    async def _linger(self) -> None:
+        """A last stop that is lost is sent again."""
+        if self._stopped and self.state == State.ABORTED:
+            self._stopped = False
+            await self.clock.sleep(LEAVING_S)
+
+    async def _listen(self) -> None:
+        async for event in self.vehicle.events():
+            self._feed(event)
+
+    def _feed(self, news: News) -> None:
+        """Tell the core what has happened, and do what follows, before anything else is looked at."""
+        self._carry_out(self.core.on(news, self._outlook.situation(), self.clock.now()))
+
+    # ---- what is to be done at once
+
+    def _carry_out(self, effects: Sequence[Effect]) -> None:
+        failures: list[NotStopped] = []
+        for effect in effects:
+            match effect:
+                case Stop() | Brake():
+                    failures += self._stop(effect)
+                case Rest():
+                    self.vehicle.stand_by("the mission wants something else now")
+                case LetGo(reason=reason):
+                    self.vehicle.release_control(reason)
+                case Tell(text=text, severity=severity):
+                    self.vehicle.status_text(text, severity)
+                case Note(text=text, level=level):
+                    log.log(level, "%s%s", self.called, text)
+                case WriteRow(row=row):
+                    self._rows.write(row)
+                case Think():
+                    self._drop_thought()
+                    self._thinking = self._group.create_task(self._think(effect))
+                case Learn(flights=flights):
+                    self.search.learn(flights)
+                case Reckon(limits=limits):
+                    self.search.limit(limits)
+                case PlanAnew():
+                    self.search.replan()
+                case DropThought():
+                    self._drop_thought()
+                case DropAction():
+                    self._drop_action()
+                case ForgetAircraft(system_id=system_id):
+                    self.vehicle.forget(system_id)
+                    self.search.forget_motion()
+                case Answer(ticket=ticket, refused=refused):
+                    self._tickets.answer(ticket, refused)
+                case _:
+                    self._drop_action()
+                    self._acting = self._group.create_task(self._act(effect))
+        if not self.standing.flying:
+            self.search.give_back()
+        for failure in failures:
+            self._feed(failure)
+
+    def _stop(self, effect: Stop | Brake) -> list[NotStopped]:
+        try:
+            if isinstance(effect, Stop):
+                self.vehicle.hold(effect.least_amsl_m)
             else:
-                await self.clock.sleep(TICK_S)
-
-    async def _fly_route(self, goal: Cell) -> None:
-        """Fly to a cell around what must not be flown over; ends early when the state changes."""
-        for point in self.helm.route(self.helm.latlon(goal)):
-            if not await self._fly_to(point):
-                return
-
-    async def _fly_to(self, point: LatLon) -> bool:
-        """Fly straight to a point; False when the state changed on the way."""
-        state = self.state
-        sent = await self._send(point, on_way=True)
-        while self.state == state:
-            if self.helm.distance(self.helm.here(), point) <= self.settings.flight.corner_m:
-                return True
-            if not sent or self.resend:
-                await self.clock.sleep(RETRY_S)
-                self.resend = False
-                sent = self.state == state and await self._send(point, on_way=True)
-            await self._tick()
-        return False
-
-    # ---- beside the phases -------------------------------------------------------------------------------
-
-    async def _guard(self) -> None:
-        """Ten times a second: can the position be trusted, is the waypoint flown, is there the energy for the way home,
-        is there too much wind?"""
-        while True:
-            if self.journal.failed is not None:  # told to somebody else, who does not fly
-                raise self._journal_lost(self.journal.failed)
-            self.homeward.update()
-            trouble = self.helm.trouble(moving=self.state in MOVING)
-            if trouble is not None and self.state in (*MOVING, State.HOLDING):
-                await self.hold(trouble.cause, trouble.reason)
-            if self.state in FLYING and (why := self._energy_low()):
-                self.why_stopped = why
-                await self._stop_searching(Event.ENERGY_LOW)
-            if self.state in FLYING and (why := self.helm.too_windy() or self.helm.strayed()):
-                self.why_stopped = why
-                await self.happen(Event.RETURN, why)
-            await self.clock.sleep(TICK_S)
-
-    async def _keep_track(self) -> None:
-        """The track, once a second."""
-        while True:
-            if not self.helm.on_ground():
-                self.flight.record(self.vehicle.telemetry, self.clock.now())
-            await self.clock.sleep(1.0)
-
-    # ---- commands ----------------------------------------------------------------------------------------
-
-    async def _send(self, point: LatLon, *, on_way: bool = False) -> bool:
-        """Send the aircraft to a point; hold when something speaks against it. False when it was not sent."""
-        refusal = await self.helm.send(point, on_way=on_way)
-        if refusal is None:
-            self.flight.waypoints += 1
-        elif refusal.cause in ("position", "limits"):
-            await self.hold(refusal.cause, refusal.reason)
-        else:
-            log.warning("waypoint not sent: %s", refusal.reason)
-        return refusal is None
-
-    async def _command(self, name: str, action: Callable[[], Awaitable[object]]) -> None:
-        """Carry out a command that is not a waypoint, if the state outlasts its row; a refusal is told, not fatal."""
-        state = self.state
-        await self._write("command", {"command": name})
-        if self.state != state:
-            return
-        try:
-            await action()
+                self.vehicle.brake()
         except LinkError as error:
-            log.warning("%s: %s", name, error)
-
-    async def _write(self, kind: str, body: Mapping[str, object]) -> None:
-        try:
-            await self.journal.append(self.clock.now(), kind, body)
-        except (sqlite3.Error, OSError) as error:
-            raise self._journal_lost(error) from error
-
-    def _journal_lost(self, error: Exception) -> JournalLost:
-        return JournalLost(f"the journal {self.journal.path} cannot be written: {error}")
-
-    async def _decided(self, decision: Decision) -> None:
-        self.flight.decisions += 1
-        self._thought(decision.effort.seconds)
-        self.path = decision.path
-        self.reason = self.search.reason(decision, self._navigator.waypoint)
-        body = {"action": decision.action, "path": decision.path[:16], "reason": self.reason.text}
-        await self._write("decision", {**body, "options": self.reason.rows()})
+            return [NotStopped(str(error))]
+        self._stopped = True
+        return []
 
     def _drop_thought(self) -> None:
         if self._thinking is not None:
             self._thinking.cancel()
             self._thinking = None
 
-    async def _tick(self) -> None:
-        """Wait for the next tick, or for news that cannot wait."""
-        self._wake.clear()
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(TICK_S / self.clock.speedup):
-                await self._wake.wait()
+    def _drop_action(self) -> None:
+        if self._acting is not None and self._acting is not asyncio.current_task():
+            self._acting.cancel()
+        self._acting = None
+
+    # ---- what takes time
+
+    async def _think(self, wanted: Think) -> None:
+        unseen = [cell for cell in wanted.ahead if cell not in self.intake.passes]
+        state = SearchState(wanted.cell, wanted.heading, wanted.speed_mps)
+        decision = await self.search.decide(state, unseen, wanted.left, self.clock.now())
+        self._thinking = None
+        self._stopwatch.decision(decision.effort.seconds)
+        reason, worth = self.search.reason(decision, wanted.cell), self.search.worth_a_look(decision.path)
+        self._feed(Thought(decision, reason, worth))
+
+    async def _act(self, action: Action) -> None:
+        """Carry out an action once all rows before it are on disk, and tell the core how it ended. A return or a
+        landing by the autopilot waits for no disk."""
+        if not isinstance(action, UNWRITTEN) and not await self._rows.all_on_disk():
+            return  # told by its own way
+        patience = self.core.settings.link.connect_timeout_s
+        news: News
+        try:
+            news = (
+                self._send(action)
+                if isinstance(action, SendWaypoint)
+                else await do(action, self.vehicle, patience)
+            )
+        except LinkError as error:
+            news = Failed(action, str(error))
+        self._acting = None
+        self._feed(news)
+
+    def _send(self, waypoint: SendWaypoint) -> Done | NotSent:
+        """The one place where a waypoint leaves for the aircraft."""
+        objection = self.core.objection(waypoint, self._outlook.situation(), self.clock.now())
+        if objection is not None:  # something happened while its row was written
+            return NotSent(waypoint, objection)
+        try:
+            self.vehicle.reposition(*waypoint.point, waypoint.altitude_m)
+        except LinkError as error:
+            return NotSent(waypoint, Objection("link", str(error)))
+        self.core.sent(waypoint)
+        if waypoint.hit_at is None:
+            return Done(waypoint)
+        latency = time.perf_counter() - waypoint.hit_at
+        self.flight.latencies_s.append(latency)
+        self._stopwatch.hit_to_waypoint(latency)
+        return Done(waypoint, latency)

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 
-from service.mavlink.events import ArmedChanged, ModeChanged, Rebooted, StatusText, VehicleEvent
+from service.mavlink.events import (
+    ArmedChanged,
+    ModeChanged,
+    Rebooted,
+    StatusText,
+    TargetReplaced,
+    VehicleEvent,
+)
+from service.mavlink.modes import mode_title
 
 _WARNING = 4  # MAV_SEVERITY: what the autopilot says at this level or worse explains its failsafe
 _MEMORY_S = 10.0
@@ -16,7 +23,7 @@ class Takeovers:
 
     def __init__(self) -> None:
         self._texts: deque[StatusText] = deque(maxlen=6)
-        self._taken_at = math.inf
+        self._taken_at: deque[float] = deque(maxlen=6)
 
     def read(self, event: VehicleEvent, *, landing: bool) -> str:
         """Why the aircraft is not ours any more after this event, for a person; nothing when it still is.
@@ -26,16 +33,22 @@ class Takeovers:
         if isinstance(event, StatusText) and event.severity <= _WARNING:
             self._texts.append(event)
         if isinstance(event, ModeChanged) and not event.commanded:
-            self._taken_at = event.time
+            self._taken_at.append(event.time)
             who = "the autopilot's failsafe" if event.failsafe else "the pilot or the autopilot"
-            return f"{who} selected {event.mode}{self.said()}"
+            return f"{who} selected {mode_title(event.mode)}{self.said(event.time)}"
+        if isinstance(event, TargetReplaced):
+            return f"{event.by} sends the aircraft to {event.found.lat:.6f}, {event.found.lon:.6f}"
         if isinstance(event, Rebooted):
             return "the autopilot has rebooted"
         if isinstance(event, ArmedChanged) and not event.armed and not landing:
             return "the aircraft has disarmed"
         return ""
 
-    def said(self) -> str:
-        """What the autopilot said around the last change of mode that we did not ask for, in brackets."""
-        said = [text.text for text in self._texts if abs(text.time - self._taken_at) < _MEMORY_S]
+    def said(self, since: float) -> str:
+        """What the autopilot said around the changes of mode that we did not ask for, from a time on, in brackets.
+
+        Around all of them: a failsafe whose words come after it is followed by the mode of an aircraft that has landed.
+        """
+        taken = [at for at in self._taken_at if at > since - _MEMORY_S]
+        said = [text.text for text in self._texts if any(abs(text.time - at) < _MEMORY_S for at in taken)]
         return f" ({'; '.join(said)})" if said else ""

@@ -1,9 +1,17 @@
 // Layers of cells: a small canvas that the browser stretches and turns over the grid, and the colours on it.
 
+import { isNight } from "./themes.js";
+
+/** @import { Run } from "./run.js" */
+
 const L = window.L;
 
 /** A canvas over the grid with `scale` pixels a cell. */
 export const Cells = L.Layer.extend({
+  /**
+   * @param {Frame} frame
+   * @param {number} scale
+   * @param {string} label */
   initialize(frame, scale, label) {
     this.frame = frame;
     this.scale = scale;
@@ -27,22 +35,36 @@ export const Cells = L.Layer.extend({
     return { viewreset: this.place, zoom: this.place, zoomanim: this.animate };
   },
   place() {
-    this.turn(this.frame.corners.map((corner) => this._map.latLngToLayerPoint(corner)));
+    this.turn(
+      this.frame.corners.map((/** @type {Place} */ corner) => this._map.latLngToLayerPoint(corner)),
+    );
   },
+  /** @param {{ zoom: number, center: Place }} event where a zoom under way leads */
   animate(event) {
-    this.turn(this.frame.corners.map((corner) => this._map._latLngToNewLayerPoint(L.latLng(corner), event.zoom, event.center)));
+    this.turn(
+      this.frame.corners.map((/** @type {Place} */ corner) =>
+        this._map._latLngToNewLayerPoint(L.latLng(corner), event.zoom, event.center),
+      ),
+    );
   },
+  /** @param {any[]} corners the grid's, as points of the layer: north-west first, clockwise */
   turn([nw, ne, , sw]) {
     const { width, height } = this.canvas;
-    const across = ne.subtract(nw).divideBy(width), down = sw.subtract(nw).divideBy(height);
+    const across = ne.subtract(nw).divideBy(width),
+      down = sw.subtract(nw).divideBy(height);
     this.canvas.style.transform = `matrix(${across.x},${across.y},${down.x},${down.y},${nw.x},${nw.y})`;
   },
-  /** Paint every cell with the colour (as a little-endian ABGR number) of its code; `inset` pixels stay free around. */
+  /** Paint every cell with the colour (as a little-endian ABGR number) of its code; `inset` pixels stay free around.
+   * @param {Uint8Array} codes
+   * @param {Uint32Array} colours
+   * @param {number} inset */
   paint(codes, colours, inset = 0) {
-    const { rows, cols } = this.frame, s = this.scale, width = cols * s;
+    const { rows, cols } = this.frame,
+      s = this.scale,
+      width = cols * s;
     if (s === 1) codes.forEach((code, i) => (this.pixels[i] = colours[code]));
-    else
-      for (let row = 0, i = 0; row < rows; row++)
+    else {
+      for (let row = 0, i = 0; row < rows; row++) {
         for (let col = 0; col < cols; col++, i++) {
           const colour = colours[codes[i]];
           for (let y = inset; y < s - inset; y++) {
@@ -50,63 +72,127 @@ export const Cells = L.Layer.extend({
             this.pixels.fill(colour, start + inset, start + s - inset);
           }
         }
+      }
+    }
     this.context.putImageData(this.image, 0, 0);
   },
 });
 
-const HEAT = [[255, 247, 188], [254, 217, 118], [253, 160, 60], [240, 84, 30], [189, 17, 40], [98, 8, 66]];
+/** @type {Colour[]} */
+const HEAT = [
+  [255, 247, 188],
+  [254, 217, 118],
+  [253, 160, 60],
+  [240, 84, 30],
+  [189, 17, 40],
+  [98, 8, 66],
+];
+/** The same for a dark ground: what stands out is bright. @type {Colour[]} */
+const HEAT_AT_NIGHT = [
+  [60, 26, 84],
+  [112, 24, 88],
+  [186, 40, 70],
+  [238, 92, 40],
+  [254, 178, 76],
+  [255, 244, 190],
+];
 const DECADES = 3;
 
-/** The colour of a place on the scale: pale for long, so that what stands out does. */
+/** The colour of a place on the scale: pale for long, so that what stands out does.
+ * @param {Colour[]} stops
+ * @param {number} part
+ * @returns {Colour} */
 function mix(stops, part) {
   const at = Math.min(1, Math.max(0, part)) ** 1.4 * (stops.length - 1);
   const low = Math.min(stops.length - 2, Math.floor(at));
-  return stops[low].map((value, i) => value + (stops[low + 1][i] - value) * (at - low));
+  return /** @type {Colour} */ (
+    stops[low].map((value, i) => value + (stops[low + 1][i] - value) * (at - low))
+  );
 }
 
-const packed = ([r, g, b], alpha) => ((Math.round(255 * alpha) << 24) | (Math.round(b) << 16) | (Math.round(g) << 8) | Math.round(r)) >>> 0;
+/** A colour as a pixel has it.
+ * @param {Colour} colour
+ * @param {number} alpha */
+const packed = ([r, g, b], alpha) =>
+  ((Math.round(255 * alpha) << 24) |
+    (Math.round(b) << 16) |
+    (Math.round(g) << 8) |
+    Math.round(r)) >>>
+  0;
 
+const heat = () => (isNight() ? HEAT_AT_NIGHT : HEAT);
+
+/** @param {number} part */
 const heatAlpha = (part) => 0.15 + 0.72 * Math.min(1, part * 1.25);
 
-/** The largest probability on the scale: the peak, rounded up to 1, 2 or 5, so that colours do not flicker. */
+/** The largest probability on the scale: the peak, rounded up to 1, 2 or 5, so that colours do not flicker.
+ * @param {Run} run */
 export function topOf(run) {
   const peak = run.probability(run.codes.reduce((most, code) => Math.max(most, code), 0));
   const decade = 10 ** Math.floor(Math.log10(peak || 1));
-  return Math.min(1, [1, 2, 5, 10].map((each) => each * decade).find((each) => each >= peak * 0.999) ?? 1);
+  return Math.min(
+    1,
+    [1, 2, 5, 10].map((each) => each * decade).find((each) => each >= peak * 0.999) ?? 1,
+  );
 }
 
-/** A colour for each code of the belief: logarithmic, three decades down from `top`. */
+/** A colour for each code of the belief: logarithmic, three decades down from `top`.
+ * @param {Run} run
+ * @param {number} top */
 export function heatColours(run, top) {
   const colours = new Uint32Array(256);
   for (let code = 1; code < 256; code++) {
     const part = 1 + Math.log10(run.probability(code) / top) / DECADES;
-    colours[code] = part <= 0 ? 0 : packed(mix(HEAT, part), heatAlpha(part));
+    colours[code] = part <= 0 ? 0 : packed(mix(heat(), part), heatAlpha(part));
   }
   return colours;
 }
 
+/** @type {Colour} */
 const LOOKED = [0, 92, 110];
+/** @type {Colour} */
+const LOOKED_AT_NIGHT = [70, 200, 220];
+const looked = () => (isNight() ? LOOKED_AT_NIGHT : LOOKED);
 
 /** A colour for each POD: the surer, the more of it. */
 export function podColours() {
-  return Uint32Array.from({ length: 256 }, (_, code) => (code ? packed(LOOKED, 0.12 + 0.6 * (code / 255)) : 0));
+  return Uint32Array.from({ length: 256 }, (_, code) =>
+    code ? packed(looked(), 0.12 + 0.6 * (code / 255)) : 0,
+  );
 }
 
+/** The scale of a legend.
+ * @param {HTMLCanvasElement} canvas
+ * @param {(part: number) => number} colour */
 function ramp(canvas, colour) {
   canvas.width = 200;
   canvas.height = 1;
-  const context = canvas.getContext("2d"), image = context.createImageData(200, 1);
+  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d")),
+    image = context.createImageData(200, 1);
   new Uint32Array(image.data.buffer).forEach((_, i, pixels) => (pixels[i] = colour(i / 199)));
   context.putImageData(image, 0, 0);
 }
 
-export const heatRamp = (canvas) => ramp(canvas, (part) => packed(mix(HEAT, part), heatAlpha(part)));
-export const podRamp = (canvas) => ramp(canvas, (part) => (part ? packed(LOOKED, 0.12 + 0.6 * part) : 0));
+/** @param {HTMLCanvasElement} canvas */
+export const heatRamp = (canvas) =>
+  ramp(canvas, (part) => packed(mix(heat(), part), heatAlpha(part)));
+/** @param {HTMLCanvasElement} canvas */
+export const podRamp = (canvas) =>
+  ramp(canvas, (part) => (part ? packed(looked(), 0.12 + 0.6 * part) : 0));
 
-/** A probability for people: two digits, as a percentage. */
+/** A probability for people: two digits, as a percentage.
+ * @param {number} part */
 export function percent(part) {
   if (part >= 0.0995) return (100 * part).toFixed(0) + " %";
   return part > 0 ? Number((100 * part).toPrecision(1)) + " %" : "0 %";
 }
 
+/** How sure: never 100 % where it is less.
+ * @param {number} part */
+export function certainty(part) {
+  if (part < 0.995) return percent(part);
+  return part < 0.9995 ? `${(100 * part).toFixed(1)} %` : "over 99.9 %";
+}
+
+/** @param {number} top */
 export const heatTicks = (top) => [3, 2, 1, 0].map((decades) => percent(top / 10 ** decades));

@@ -1,82 +1,165 @@
 // The page: one connection, one run, one map.
 
-import { Events, keepToken } from "./link.js";
+import { alertOf } from "./alerts.js";
+import { $, placeOf, say } from "./dom.js";
+import { several, showFleet, stillFleet } from "./fleet.js";
+import { showFound } from "./found.js";
+import { showLayers, showLegend, showScale } from "./layers.js";
+import { Events, hasToken, keepToken } from "./link.js";
 import { Chart } from "./map.js";
-import { showOrders, showSuspects } from "./orders.js";
-import { $, say, showCurve, showFacts, showLayers, showNext, showPos, showScale } from "./panel.js";
+import { placeByClick, showNews } from "./news.js";
+import { showOrders } from "./orders.js";
+import { showCurve, showFacts, showPos } from "./panel.js";
 import { Replay } from "./replay.js";
 import { Run } from "./run.js";
+import { showNext, showStrip } from "./strip.js";
+import { forgetSuspects, showSuspects } from "./suspects.js";
+import { follow, placeTools } from "./tools.js";
 
-let run = null, chart = null, replay = null, live = false;
+const SAME_CELLS = 2; // so far may a detection move and still be the same
+const FINAL = ["DONE", "ABORTED"];
 
+/** @type {Run | null} */
+let run = null;
+/** @type {Chart | null} */
+let chart = null;
+/** @type {Replay | null} */
+let replay = null;
+let live = false;
+let shown = false; // something was, of this scene: from then on what comes is news
+
+/** @param {Scene} scene */
 const place = (scene) => `view of ${scene.area} ${JSON.stringify(scene.frame.corners[0])}`;
+/** What the map showed at an earlier visit.
+ * @param {Scene} scene
+ * @returns {View | null} */
 function kept(scene) {
   try {
-    return JSON.parse(localStorage.getItem(place(scene)));
+    return JSON.parse(localStorage.getItem(place(scene)) ?? "null");
   } catch {
     return null;
   }
 }
 
+/** @param {Scene} scene */
 function begin(scene) {
   const before = run?.scene;
   run = new Run(scene);
   live = !scene.replay;
+  shown = false;
   document.title = `${scene.area} · roisearch`;
   say($("area"), scene.area);
-  $("orders").hidden = !live;
-  if (!live && !replay) replay = new Replay(scene.replay, (at) => events.show(at));
-  if (before && place(before) === place(scene)) chart.run = run; // the service was started again: keep the view
-  else {
+  $("orders").hidden = !live || scene.read_only;
+  $("read-only").hidden = !live || !scene.read_only;
+  if (scene.replay && !replay) {
+    replay = new Replay(scene.replay, (at) => {
+      forgetSuspects();
+      events.show(at);
+    });
+  }
+  if (chart && before && place(before) === place(scene)) {
+    chart.run = run; // the service was started again: keep the view
+    if (before.drawn !== scene.drawn) chart.redraw();
+  } else {
     chart?.map.remove();
-    const keep = (view) => localStorage.setItem(place(scene), JSON.stringify(view));
-    chart = new Chart($("map"), run, kept(scene), keep, () => $("suspects-card").scrollIntoView({ block: "nearest" }));
+    const keep = (/** @type {View} */ view) =>
+      localStorage.setItem(place(scene), JSON.stringify(view));
+    chart = new Chart($("map"), run, kept(scene), keep, () =>
+      $("suspects-card").scrollIntoView({ block: "nearest" }),
+    );
+    chart.onView = showLegend;
+    placeByClick(chart.map);
+    placeTools(chart, scene.coordinates);
     showLayers(chart);
   }
 }
 
+/** The likely places lie elsewhere now.
+ * @param {Drawn} drawn */
+function redraw({ regions, names, drawn }) {
+  if (!run || !chart) return;
+  Object.assign(run.scene, { regions, names, drawn });
+  chart.redraw();
+}
+
+/** @param {Moment} moment */
 function show(moment) {
-  const changed = run.take(moment), { state } = run;
+  if (!run || !chart) return; // no scene yet
+  const changed = run.take(moment);
+  const { state, scene } = run;
+  const mayOrder = live && !scene.read_only;
   const chip = $("chip");
-  say(chip, live ? state.state : `${state.state} (replay)`);
+  say(chip, live ? state.words : `${state.words} (replay)`);
   chip.dataset.state = state.state;
-  say($("why"), state.why ?? "");
-  showOrders(state.state, live);
-  showSuspects(state, live, (each) => chart.goTo(each));
+  showStrip(state);
+  showOrders(several(state) ? state.aircraft.map((each) => each.state) : [state.state], mayOrder);
+  showFleet(state, mayOrder);
+  showPlaces(state, mayOrder);
+  showNews(state.news, mayOrder);
   chart.draw(changed);
-  if (changed.has("belief")) showScale(chart.top);
+  follow(state);
+  if (changed.has("belief") && chart.shows === "belief") showScale(chart.top);
   if (changed.has("curve") || !$("curve").firstChild) showCurve(run);
   showPos(run);
   showNext(state);
   showFacts(state);
   replay?.shown(state.time);
+  shown = true;
 }
 
-const FINAL = ["DONE", "ABORTED"];
+/** What was seen and what was found, and who is told of it.
+ * @param {RunState} state
+ * @param {boolean} mayOrder */
+function showPlaces(state, mayOrder) {
+  if (!run || !chart) return;
+  const { area, frame } = run.scene;
+  const goTo = (/** @type {{ lat: number, lon: number }} */ where) => {
+    chart?.goTo(where);
+    $("map").scrollIntoView({ block: "center" }); // on a phone the list lies below the map
+  };
+  const found = showFound(state, mayOrder, goTo);
+  const fresh = showSuspects(state, mayOrder, SAME_CELLS * frame.cell_m, goTo);
+  if (!live || !shown) return;
+  if (found && state.found) alertOf("found", state.found, area);
+  else for (const each of fresh) alertOf("suspect", each, area);
+}
+
+/** The service has gone; after a run that is over that is as it should be.
+ * @param {RunState | undefined} last */
+function ended(last) {
+  const found = last?.found ? `It was found at ${placeOf(last.found)}.` : "";
+  say($("ended"), `The search is over and the service has ended. ${found}`.trim());
+  $("ended").hidden = false;
+}
+
 const events = new Events({
-  message: (message) => (message.type === "scene" ? begin(message) : run && show(message)),
+  message: (message) => {
+    if (message.type === "scene") begin(message);
+    else if (message.type === "regions") redraw(message);
+    else show(message);
+  },
   up: () => {
     $("lost").hidden = true;
+    $("ended").hidden = true;
     $("entry").hidden = true;
   },
   down: () => {
-    const over = FINAL.includes(run?.state?.state);
-    say($("lost"), over ? "The run is over and the service has ended; this is what it last told." : "No connection to the service; trying again. What you see is not up to date.");
+    showOrders([], false);
+    stillFleet();
+    if (run?.state && FINAL.includes(run.state.state)) return void ended(run.state);
+    say($("lost"), "No connection to the service; trying again. What you see is not up to date.");
     $("lost").hidden = false;
-    if (!over) {
-      say($("chip"), "no connection");
-      $("chip").dataset.state = "lost";
-    }
-    showOrders("", false);
+    say($("chip"), "no connection");
+    $("chip").dataset.state = "lost";
   },
   refused: (error) => {
     $("entry").hidden = false;
-    say($("refused"), sessionStorage.getItem("token") ? error.message : "");
-    say($("chip"), "a token is needed");
+    say($("refused"), hasToken() ? error.message : "");
+    say($("chip"), hasToken() ? "wrong token" : "a token is needed");
   },
 });
 
-$("entry").addEventListener("submit", (event) => {
+$("entry").addEventListener("submit", (/** @type {SubmitEvent} */ event) => {
   event.preventDefault();
   keepToken($("token").value.trim());
   $("token").value = "";

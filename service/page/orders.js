@@ -1,106 +1,147 @@
 // Orders: what moves the aircraft is asked twice, except to stop, which must not wait.
 
+import { $, placeOf, say } from "./dom.js";
 import { order } from "./link.js";
-import { $, make, say } from "./panel.js";
-import { percent } from "./cells.js";
 
 const FLYING = ["SEARCHING", "CONFIRMING"];
+/** In which states an order may be given. @type {Record<string, string[]>} */
 const MAY = {
-  hold: [...FLYING, "RETURNING"],
+  hold: [...FLYING, "READY", "TAKEOFF", "RETURNING"],
+  launch: ["READY", "GROUNDED", "HOLDING", "YIELDED"],
+  replace: ["GROUNDED"],
   resume: ["HOLDING", "YIELDED"],
   return: [...FLYING, "TAKEOFF", "HOLDING", "YIELDED"],
+  finish: [...FLYING, "READY", "TAKEOFF", "HOLDING", "YIELDED", "FOUND", "RETURNING", "GROUNDED"],
 };
+const FOR_ALL = ["hold", "finish"];
+/** What is asked before: title, text, and the button that does it. @type {Record<string, string[]>} */
 const QUESTIONS = {
-  resume: ["Resume the search?", "The aircraft leaves its place and flies on with the search.", "Resume"],
-  return: ["Return to launch?", "The search ends; the aircraft flies home and lands.", "Return"],
-  confirm: ["Confirm the target?", "This is what was looked for: the search ends and the aircraft flies home.", "Confirm"],
-  reject: ["Reject this detection?", "The map is lowered there, and the search goes on elsewhere. It cannot be taken back.", "Reject"],
+  resume: [
+    "Resume the search?",
+    "The aircraft leaves its place and flies on with the search.",
+    "Resume",
+  ],
+  launch: [
+    "Take off?",
+    "The aircraft, which stands on the ground, arms and climbs. Nobody may be near it.",
+    "Launch",
+  ],
+  replace: [
+    "Another aircraft?",
+    "The search forgets the aircraft that landed, and takes the next that is heard on its link, or the one with " +
+      "the system id that you give. Switch the old one off before.",
+    "Replace",
+  ],
+  return: [
+    "Return to launch?",
+    "The aircraft flies home and lands. The search can go on with another battery.",
+    "Return",
+  ],
+  finish: [
+    "Finish the search?",
+    "An aircraft of ours flies home and lands, and no further flight follows: the search is over.",
+    "Finish",
+  ],
+  confirm: [
+    "Confirm PLACE?",
+    "This is what was looked for: the search ends and the aircraft flies home.",
+    "Confirm",
+  ],
+  reject: [
+    "Reject PLACE?",
+    "The map is lowered there, and the search goes on elsewhere. It cannot be taken back.",
+    "Reject",
+  ],
 };
 
+/** @type {ReturnType<typeof setTimeout> | undefined} */
 let clearing;
+/** Say something for a few seconds.
+ * @param {string} text */
 export function tell(text) {
   clearTimeout(clearing);
   say($("toast"), text);
   clearing = setTimeout(() => say($("toast"), ""), 5000);
 }
 
+/** Whether an order makes sense in a state.
+ * @param {string} command
+ * @param {string} state */
+export const mayGive = (command, state) => (MAY[command] ?? []).includes(state);
+
 /** Ask; every question has a dialog of its own, since a closed dialog's "close" event may come late, after the next
- * question was opened, and must not answer that one. */
-function sure(command) {
-  const [title, text, yes] = QUESTIONS[command], dialog = $("ask").content.firstElementChild.cloneNode(true);
-  dialog.querySelector("h2").textContent = title;
+ * question was opened, and must not answer that one.
+ * @param {string} command
+ * @param {string} place
+ * @param {string} who the aircraft that is meant, where there are several
+ * @returns {Promise<{ yes: boolean, system?: number }>} with the system id that was given, where one is asked for */
+function sure(command, place, who) {
+  const [title, text, yes] = QUESTIONS[command],
+    dialog = $("ask").content.firstElementChild.cloneNode(true);
+  dialog.querySelector("h2").textContent = who + title.replace("PLACE", place);
   dialog.querySelector("p").textContent = text;
   dialog.querySelector(".go").textContent = yes;
+  const system = dialog.querySelector("[name=system]");
+  system.parentElement.hidden = system.disabled = command !== "replace";
   document.body.append(dialog);
   dialog.showModal();
-  return new Promise((settle) => dialog.addEventListener("close", () => {
-    dialog.remove();
-    settle(dialog.returnValue === "yes");
-  }));
+  return new Promise((settle) =>
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      settle({ yes: dialog.returnValue === "yes", system: Number(system.value) || undefined });
+    }),
+  );
 }
 
-export async function give(command, place = {}) {
-  if (QUESTIONS[command] && !(await sure(command))) return;
+/** What became of an order, for people. @type {Record<string, string>} */
+const DONE = {
+  hold: "It holds still",
+  resume: "The search goes on",
+  return: "It flies home",
+  launch: "It takes off",
+  replace: "Waiting for another aircraft",
+  finish: "The search is finished",
+  confirm: "Confirmed",
+  reject: "Rejected",
+};
+
+/** Give an order, after a question where it has one.
+ * @param {string} command
+ * @param {{ written?: string, lat: number, lon: number } | null} place what it is about, if it is about one
+ * @param {string} [aircraft] the one that is meant; else all of them, or the only one */
+export async function give(command, place = null, aircraft = undefined) {
+  const where = place ? placeOf(place) : "",
+    who = aircraft === undefined ? "" : `Aircraft ${aircraft}: `;
+  const { lat, lon } = place ?? {}; // as it was when the button was pressed
+  const { yes, system } = QUESTIONS[command] ? await sure(command, where, who) : { yes: true };
+  if (!yes) return;
   try {
-    const { state } = await order({ command, ...place });
-    tell(`${command}: ${state}`);
+    const { refused } = await order({ command, lat, lon, aircraft, system_id: system });
+    const which = system === undefined ? "" : `, of system ${system}`;
+    const done = `${DONE[command] ?? command}${which}${where && ": "}${where}`;
+    tell(who + (refused ? `${command} is refused: ${refused}` : done));
   } catch (error) {
-    tell(`${command} failed: ${error.message}`);
+    tell(`${who}${command} failed: ${/** @type {Error} */ (error).message}`);
   }
 }
 
-export function showOrders(state, mayOrder) {
+/** The buttons, of which only those that make sense now can be pressed. Of several aircraft each has its own; then here
+ * are those for all of them, and the one that holds them all can always be pressed.
+ * @param {string[]} states of all aircraft
+ * @param {boolean} mayOrder */
+export function showOrders(states, mayOrder) {
+  const all = states.length > 1;
   for (const button of $("orders").children) {
-    const usable = mayOrder && (MAY[button.dataset.command] ?? []).includes(state);
+    const { command } = button.dataset;
+    const sensible = states.some((state) => mayGive(command, state));
+    const usable = mayOrder && (sensible || (all && command === "hold"));
     if (button.disabled === usable) button.disabled = !usable;
+    if (!states.length) continue; // there is nothing new to say
+    button.hidden = all && !FOR_ALL.includes(command);
+    if (command === "hold") say(button, all ? "Hold all" : "Hold");
   }
 }
 
-for (const button of $("orders").children) button.addEventListener("click", () => give(button.dataset.command));
-
-const key = ({ lat, lon }) => `${lat.toFixed(6)}, ${lon.toFixed(6)}`;
-
-/** The detections that a person should judge; their list is rebuilt only when they are other ones. */
-export function showSuspects(state, mayOrder, onShow) {
-  const suspects = state.suspects ?? [], list = $("suspects"), card = $("suspects-card");
-  card.hidden = !suspects.length && !state.found;
-  say($("suspects-title"), state.found ? "Found" : "Detections");
-  const wanted = JSON.stringify([suspects.map((each) => [key(each), each.thumbnail]), state.found, mayOrder]);
-  if (list.dataset.shown !== wanted) {
-    list.dataset.shown = wanted;
-    list.replaceChildren(...(state.found ? [foundItem(state.found)] : suspects.map((each) => suspectItem(each, mayOrder, onShow))));
-  }
-  if (state.found) return;
-  suspects.forEach((each, i) => {
-    const hits = Array.isArray(each.hits) ? each.hits.length : each.hits;
-    say(list.children[i].querySelector(".sure"), `${percent(each.probability)} sure${hits ? `, ${hits} ${hits === 1 ? "hit" : "hits"}` : ""}`);
-  });
-}
-
-function foundItem(found) {
-  const where = found.ellipse ? `, within ${Math.round(found.ellipse.semi_major_m)} m by ${Math.round(found.ellipse.semi_minor_m)} m` : "";
-  return make("li", {}, make("strong", { textContent: key(found) }), make("span", { className: "where", textContent: `${(100 * found.probability).toFixed(1)} % sure${where}` }), ...(found.thumbnail ? [picture(found.thumbnail)] : []));
-}
-
-function suspectItem(each, mayOrder, onShow) {
-  const item = make("li", {});
-  item.append(make("strong", { className: "sure" }), make("span", { className: "where", textContent: key(each) }));
-  const show = make("button", { type: "button", textContent: "Show" });
-  show.addEventListener("click", () => onShow(each));
-  const buttons = [show];
-  if (mayOrder) {
-    const confirm = make("button", { type: "button", textContent: "Confirm", className: "go" });
-    confirm.addEventListener("click", () => give("confirm", { lat: each.lat, lon: each.lon }));
-    const reject = make("button", { type: "button", textContent: "Reject" });
-    reject.addEventListener("click", () => give("reject", { lat: each.lat, lon: each.lon }));
-    buttons.push(confirm, reject);
-  }
-  if (each.thumbnail) item.append(picture(each.thumbnail));
-  item.append(make("div", { className: "verdict" }, ...buttons));
-  return item;
-}
-
-/** The address of the detector's picture: elsewhere, so only a click asks for it. */
-function picture(address) {
-  return make("a", { href: address, target: "_blank", rel: "noreferrer", textContent: "Picture" });
+for (const button of $("orders").children) {
+  button.addEventListener("click", () => give(button.dataset.command));
 }

@@ -1,20 +1,34 @@
 // The time slider of a run that is over.
 
-import { $, lasting, say } from "./panel.js";
+import { $, lasting, say } from "./dom.js";
 
 const SPEED = 20; // seconds of the run a second
 const TICK_MS = 250;
 
 export class Replay {
+  /** @type {ReturnType<typeof setInterval> | undefined} */
+  playing;
+
+  /**
+   * @param {[number, number]} span first and last time, seconds since the epoch
+   * @param {(at: number) => void} show */
   constructor([first, last], show) {
-    Object.assign(this, { first, last, show, playing: null });
+    this.first = first;
+    this.last = last;
+    this.show = show;
     const slider = $("time");
-    Object.assign(slider, { min: 0, max: Math.ceil(last - first), step: 1, value: Math.ceil(last - first) });
+    Object.assign(slider, {
+      min: 0,
+      max: Math.ceil(last - first),
+      step: 1,
+      value: Math.ceil(last - first),
+    });
     slider.addEventListener("input", () => this.go(Number(slider.value)));
     $("play").addEventListener("click", () => (this.playing ? this.stop() : this.play()));
     $("replay").hidden = false;
   }
 
+  /** @param {number} seconds from the first time on */
   go(seconds) {
     this.show(this.first + seconds);
   }
@@ -34,15 +48,19 @@ export class Replay {
 
   stop() {
     clearInterval(this.playing);
-    this.playing = null;
+    this.playing = undefined;
     this.button("Play", false);
   }
 
+  /**
+   * @param {string} text
+   * @param {boolean} pressed */
   button(text, pressed) {
     say($("play"), text);
     $("play").setAttribute("aria-pressed", pressed);
   }
 
+  /** @param {number} time */
   shown(time) {
     const text = `${lasting(Math.max(0, time - this.first))} of ${lasting(this.last - this.first)}`;
     say($("clock"), text);

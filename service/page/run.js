@@ -1,8 +1,13 @@
 // What is known of the run: a scene, and what the moments since have changed in it.
 
+/** @param {string} text */
 const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
+/** @type {Growing[]} */
+const GROWING = ["track", "hits", "curve"];
+
 export class Run {
+  /** @param {Scene} scene */
   constructor(scene) {
     this.scene = scene;
     const cells = scene.frame.rows * scene.frame.cols;
@@ -10,45 +15,61 @@ export class Run {
     this.pod = new Uint8Array(cells); // in 255ths
     this.reference = 0;
     this.log2Total = 0;
+    /** Positions flown. @type {Place[]} */
     this.track = [];
+    /** Positions of hits. @type {Place[]} */
     this.hits = [];
+    /** Seconds and POS. @type {Place[]} */
     this.curve = [];
-    this.state = null;
+    /** There from the first moment on; nothing is shown before. @type {RunState} */
+    this.state = /** @type {any} */ (null);
   }
 
-  /** Take a moment in; returns which of belief, pod, track, hits and curve have changed. */
+  /** Take a moment in; returns what has changed.
+   * @param {Moment} moment */
   take(moment) {
+    /** @type {Set<Changing>} */
     const changed = new Set();
     this.state = moment.state;
     const { belief, pod } = moment;
-    if (belief.reference !== this.reference || belief.log2_total !== this.log2Total) changed.add("belief");
+    if (belief.reference !== this.reference || belief.log2_total !== this.log2Total) {
+      changed.add("belief");
+    }
     this.reference = belief.reference;
     this.log2Total = belief.log2_total;
     if (this.patch(this.codes, belief)) changed.add("belief");
     if (this.patch(this.pod, pod)) changed.add("pod");
-    for (const name of ["track", "hits", "curve"]) {
-      if (!moment[name]) continue;
-      this[name].length = moment[name].from;
-      for (const row of moment[name].rows) this[name].push(row);
+    for (const name of GROWING) {
+      const news = moment[name];
+      if (!news) continue;
+      this[name].length = news.from;
+      for (const row of news.rows) this[name].push(row);
       changed.add(name);
     }
     return changed;
   }
 
+  /**
+   * @param {Uint8Array} target
+   * @param {BytesNews} news */
   patch(target, news) {
     if (!news.codes) return false;
     const codes = bytes(news.codes);
-    if (news.at) new Uint32Array(bytes(news.at).buffer).forEach((cell, i) => (target[cell] = codes[i]));
-    else target.set(codes);
+    if (news.at) {
+      new Uint32Array(bytes(news.at).buffer).forEach((cell, i) => (target[cell] = codes[i]));
+    } else target.set(codes);
     return true;
   }
 
-  /** The probability that a code stands for. */
+  /** The probability that a code stands for.
+   * @param {number} code */
   probability(code) {
     return code ? 2 ** (this.reference + (code - 255) / 8 - this.log2Total) : 0;
   }
 
-  /** The cell under a position, by the affine map that the grid's corners make; null off the grid. */
+  /** The cell under a position, by the affine map that the grid's corners make; null off the grid.
+   * @param {number} lat
+   * @param {number} lon */
   cellAt(lat, lon) {
     const [nw, ne, , sw] = this.scene.frame.corners;
     const [ax, ay, bx, by] = [ne[1] - nw[1], ne[0] - nw[0], sw[1] - nw[1], sw[0] - nw[0]];
@@ -56,7 +77,9 @@ export class Run {
     const area = ax * by - ay * bx;
     const col = Math.floor(((x * by - y * bx) / area) * this.scene.frame.cols);
     const row = Math.floor(((y * ax - x * ay) / area) * this.scene.frame.rows);
-    if (row < 0 || col < 0 || row >= this.scene.frame.rows || col >= this.scene.frame.cols) return null;
+    if (row < 0 || col < 0 || row >= this.scene.frame.rows || col >= this.scene.frame.cols) {
+      return null;
+    }
     return row * this.scene.frame.cols + col;
   }
 }

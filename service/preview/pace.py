@@ -1,62 +1,41 @@
-"""How long a flight along cells takes, before it is flown.
+"""How long the rest of a flight takes, before it is flown: up, to the search, and home.
 
-The aircraft flies each straight leg with the search's speed and the braking of `flight.deceleration_mps2`, which is
-taken for speeding up as well, and comes to a stand at every turn. That is an allowance and no law: in two simulated
-searches of 220 steps with cells of 25 m, an aircraft like PX4 took 3 % longer than this and one like ArduPilot, which
-cuts corners, 19 % shorter. Wind, and false alarms beyond those of the detector's p_tn, come on top.
+How long the search itself takes, from cell to cell, `roisearch.Motion` says.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from roisearch import Motion
 from service.area import Grid, way_home
-from service.area.model import LatLon
 from service.area.projection import FloatArray
 from service.config import FlightSettings
+from service.geometry import LatLon
+from service.ground.flown import heights_over
+from service.ground.relief import Relief
+from service.motion import motion_of
 
 ARMING_S = 4.0
 
-ALLOWANCE = "every turn taken as a full stop (PX4 simulated: 3 % slower, ArduPilot simulated: 19 % faster)"
 
-
-def leg_seconds(length_m: float, flight: FlightSettings) -> float:
-    """Seconds for a straight leg from standstill to standstill."""
-    speed, braking = flight.speed_mps, flight.deceleration_mps2
-    if length_m >= speed**2 / braking:
-        return length_m / speed + speed / braking
-    return 2.0 * float(np.sqrt(length_m / braking))
-
-
-def climb_seconds(flight: FlightSettings) -> float:
-    """Seconds for the take-off to the height of the search, arming and settling included.
+def climb_seconds(flight: FlightSettings, grid: Grid) -> float:
+    """Seconds for the take-off to the height of the search at the launch point, arming and settling included.
 
     The simulated flights took 18 and 19 s to 30 m, with `flight.climb_mps` at 2.
     """
-    return flight.altitude_m / flight.climb_mps + ARMING_S
+    return take_off_m(flight, grid) / flight.climb_mps + ARMING_S
 
 
-def cell_seconds(
-    cells: Sequence[tuple[int, int]], stops: Sequence[int], cell_m: float, flight: FlightSettings
-) -> NDArray[np.float64]:
-    """Seconds at which each of `cells` is entered, float [n], the first at 0; neighbours follow each other.
-
-    `stops`: indices of cells, beside those where the path turns, at which the aircraft stops.
-    """
-    moves = np.diff(np.asarray(cells, dtype=np.int64).reshape(-1, 2), axis=0)
-    turned = np.flatnonzero((moves[1:] != moves[:-1]).any(axis=1)) + 1
-    inner = {int(stop) for stop in stops if 0 < stop < len(moves)}
-    ends = [*sorted({*turned.tolist(), *inner}), len(moves)] if len(moves) else []
-    times, begun = [0.0], 0
-    for end in ends:
-        count = end - begun
-        seconds = leg_seconds(count * cell_m, flight)
-        times += [times[begun] + seconds * (step + 1) / count for step in range(count)]
-        begun = end
-    return np.array(times)
+def take_off_m(flight: FlightSettings, grid: Grid) -> float:
+    """The height of the search above the launch point, there."""
+    if grid.relief is None:
+        return flight.altitude_m
+    height = float(heights_over(grid.relief, grid.frame.to_metres([grid.launch]), flight)[0])
+    return height if math.isfinite(height) else flight.altitude_m
 
 
 def way_metres(grid: Grid, start: LatLon, end: LatLon) -> FloatArray:
@@ -65,9 +44,26 @@ def way_metres(grid: Grid, start: LatLon, end: LatLon) -> FloatArray:
 
 
 def route_seconds(grid: Grid, flight: FlightSettings, start: LatLon, end: LatLon) -> float:
-    """Seconds for that way, at the height of the search."""
-    legs = np.hypot(*np.diff(way_metres(grid, start, end), axis=0).T)
-    return sum(leg_seconds(float(length), flight) for length in legs)
+    """Seconds for that way, at the height of the search, with a stop at each bend; over ground with heights it takes
+    what its climbs and descents take, where that is longer."""
+    motion = motion_of(flight, grid.frame.cell_m)
+    points = way_metres(grid, start, end)
+    legs = np.hypot(*np.diff(points, axis=0).T)
+    seconds = sum(motion.leg_seconds(float(length)) for length in legs)
+    if grid.relief is None:
+        return seconds
+    return seconds + sum(_climbing_s(grid.relief, motion, flight, a, b) for a, b in pairwise(points))
+
+
+def _climbing_s(
+    relief: Relief, motion: Motion, flight: FlightSettings, a: FloatArray, b: FloatArray
+) -> float:
+    """What a leg's climbs and descents add to it, piece by piece of half a cell at the most."""
+    length = math.hypot(*(b - a))
+    pieces = max(1, math.ceil(2.0 * length / motion.cell_m))
+    heights = heights_over(relief, a + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (b - a), flight)
+    upright = motion.upright_s(np.diff(heights[np.isfinite(heights)]))
+    return float(np.maximum(upright - length / pieces / motion.speed_mps, 0.0).sum())
 
 
 def farthest_from_launch(grid: Grid) -> LatLon:

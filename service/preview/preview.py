@@ -1,7 +1,8 @@
 """What a search of an area will be like, worked out before anybody flies.
 
 The real planner is flown over the prior without a target: once with a detector that raises no alarm, for the path,
-and a few times with as many false alarms as its p_tn says, for the times. How long that takes in the air is in `pace`.
+and a few times with as many false alarms as its p_tn says, for the times. How long that
+takes says the motion that the planner plans by, and `pace` what comes before and after.
 """
 
 from __future__ import annotations
@@ -11,14 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from roisearch import Regions
+from roisearch import Motion, Regions
 from service.area import Grid, SearchArea
 from service.config import Settings
 from service.errors import BadInput
-from service.mission.energy import Energy, WayHome
-from service.mission.flight import LatLon
+from service.geometry import LatLon
+from service.mission.energy import Energy, Left, WayHome
+from service.preview.batteries import Help, OneBattery, first_look_s, fly_batteries, what_would_help
 from service.preview.foresight import Foresight, foresee
-from service.preview.pace import climb_seconds, farthest_from_launch, route_seconds, way_metres
+from service.preview.pace import farthest_from_launch, way_metres
 from service.search import Search
 
 GOALS = (0.5, 0.75, 0.95)
@@ -67,6 +69,8 @@ class Preview:
         battery_s: how long one battery flies until it is time to go home; `pos_battery` is the POS by then.
         home: the longest way home, in no wind, landing included.
         kept_percent: what is left of the battery then, for that way and as a reserve; None: no battery is known.
+        full_s: how long a full battery lasts, as told or set; `batteries` are flown one after another, their ends
+            planned; `helps` is what one would find from higher up.
     """
 
     area: SearchArea
@@ -74,6 +78,7 @@ class Preview:
     settings: Settings
     regions: tuple[Region, ...]
     labels: Regions
+    motion: Motion
     reachable: float
     before_s: float
     path: Foresight
@@ -83,12 +88,23 @@ class Preview:
     pos_battery: tuple[float, ...]
     home: WayHome
     kept_percent: float | None
+    full_s: float
+    batteries: tuple[OneBattery, ...]
+    helps: tuple[Help, ...] = ()
 
 
 def preview(
-    area: SearchArea, grid: Grid, settings: Settings, battery_min: float | None, told: Told
+    area: SearchArea,
+    grid: Grid,
+    settings: Settings,
+    battery_min: float | None,
+    told: Told,
+    resurvey: Callable[[Settings], Grid] | None = None,
 ) -> Preview:
-    """Work it out; `battery_min` minutes is what a full battery flies, None: `flight.max_flight_s` is the limit."""
+    """Work it out; `battery_min` minutes is what a full battery flies, None: `flight.max_flight_s` is the limit.
+
+    `resurvey` lays the grid for other settings: with it, what would help is worked out where one battery is too little.
+    """
     flight = settings.flight
     search = Search(grid, settings)
     regions = search.regions
@@ -96,11 +112,8 @@ def preview(
     seen = grid.reachable_mass if search.fov.is_point else 1.0  # a wider footprint sees over the edge
     reachable = (1.0 - grid.outside) * seen
     until = min(max(GOALS), ENOUGH * reachable)
-    start = grid.frame.to_latlon([grid.start])[0]
-    before = climb_seconds(flight) + route_seconds(
-        grid, flight, grid.launch, (float(start[0]), float(start[1]))
-    )
-    home = _longest_way_home(grid, settings)
+    before = first_look_s(grid, settings)
+    home = _longest_way_home(search)
     battery, kept = flight.max_flight_s, None
     if battery_min is not None:
         energy = Energy(100.0, 100.0 / (60.0 * battery_min), home)
@@ -124,6 +137,9 @@ def preview(
             told=lambda seconds, pos: told(name, min(1.0, pos / until)),
         )
 
+    full = flight.full_battery_s if battery_min is None else 60.0 * battery_min
+    batteries = fly_batteries(grid, settings, full, until, told)
+    helps = what_would_help(resurvey, settings, full, until, told) if resurvey and len(batteries) > 1 else ()
     path = fly("the path", False, DRAWS)
     draws = tuple(fly(f"search {n + 1} of {DRAWS} with false alarms", True, n) for n in range(DRAWS))
     return Preview(
@@ -132,6 +148,7 @@ def preview(
         settings=settings,
         regions=_regions(grid, search),
         labels=regions,
+        motion=search.motion,
         reachable=reachable,
         before_s=before,
         path=path,
@@ -141,6 +158,9 @@ def preview(
         pos_battery=tuple(draw.pos_at(battery - before) for draw in draws),
         home=home,
         kept_percent=kept,
+        full_s=full,
+        batteries=batteries,
+        helps=helps,
     )
 
 
@@ -177,8 +197,19 @@ def _regions(grid: Grid, search: Search) -> tuple[Region, ...]:
     return tuple(found)
 
 
-def _longest_way_home(grid: Grid, settings: Settings) -> WayHome:
-    """From the cell that is farthest from the launch point, as the flight itself will reckon it."""
-    points = way_metres(grid, farthest_from_launch(grid), grid.launch)
-    flight = settings.flight
-    return WayHome.along([(east, -south) for east, south in points.tolist()], flight.altitude_m, None, flight)
+def _longest_way_home(search: Search) -> WayHome:
+    """From the cell that is farthest from the launch point, as the flight itself will reckon it; over ground with
+    heights, from the one with which climb and descent take longest."""
+    grid, flight = search.grid, search.settings.flight
+    if search.heights is None:
+        points = way_metres(grid, farthest_from_launch(grid), grid.launch)
+        return WayHome.along(
+            [(east, -south) for east, south in points.tolist()], flight.altitude_m, None, flight
+        )
+    seconds = np.where(grid.flyable, search.reach.home_s(Left(0.0, 0.0, 0.0, 0.0, grid.launch)), -1.0)
+    row, col = np.unravel_index(int(seconds.argmax()), seconds.shape)
+    lat, lon = grid.frame.to_latlon([(row, col)])[0]
+    length = float(
+        np.hypot(*np.diff(way_metres(grid, (float(lat), float(lon)), grid.launch), axis=0).T).sum()
+    )
+    return WayHome(length, float(seconds[row, col]), 0.0)

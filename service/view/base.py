@@ -2,40 +2,87 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from roisearch import Regions
 from service.area import SearchArea
-from service.config import Settings
-from service.evidence.observe import Pose
+from service.config import Settings, each_aircraft
+from service.evidence.found import Found
+from service.evidence.observe import FramePose
 from service.evidence.sensors import Profile
-from service.mission.flight import LatLon
+from service.geometry import LatLon
+from service.mission.states import State
+from service.news.bearing import FieldNews
+from service.places import written
+from service.reasons import Option
+from service.rows import SortieRow
 from service.search import Search
-from service.view.scene import describe
-from service.view.shapes import (
-    area_features,
-    cell_features,
-    collection,
-    feature,
-    line,
-    point,
-    region_features,
+from service.view.feed import Moment
+from service.view.maps import draw_map
+from service.view.next import ChoiceState, NextState, choices, next_state
+from service.view.scene import Ground
+from service.view.state import (
+    DrawnState,
+    FootprintCell,
+    FootprintState,
+    FoundState,
+    NewsState,
+    PlaceState,
+    RunState,
+    SortieState,
+    SuspectState,
+    found_state,
+    suspect_states,
 )
 
 
 class BaseView:
     """A search to look at; who derives from it says where the aircraft is and what state the search is in."""
 
-    def __init__(self, area: SearchArea, search: Search, sensor: Profile, settings: Settings) -> None:
-        self.area, self.search, self.sensor, self.settings = area, search, sensor, settings
-        self._outlines = region_features(search.grid, search.regions.labels)
+    def __init__(
+        self, area: SearchArea, search: Search, sensors: Mapping[str, Profile], settings: Settings
+    ) -> None:
+        """`sensors`: that of each aircraft by its name; "" that of the only one."""
+        self.area, self.search, self.sensors, self.settings = area, search, sensors, settings
+        self._chances = {
+            name: (alone.sensor.p_tp, alone.sensor.p_tn) for name, alone in each_aircraft(settings).items()
+        }
+        how = settings.run.coordinates
+        drawing = search.drawing
+        self.ground = Ground.of(area, search.grid, drawing.labels, settings.search.planner, how)
+        """The ground with the regions as they were drawn when this view was made."""
+        self._ground = self.ground
+
+    def ground_now(self) -> Ground:
+        """The ground with the regions as they are drawn now; where they are other ones it outlines them, which takes
+        long on a large map."""
+        drawing = self.search.drawing
+        if drawing.number != self._ground.drawn:
+            self._ground = (
+                self.ground if drawing.number == self.ground.drawn else self.ground.redrawn(drawing)
+            )
+        return self._ground
+
+    def names(self) -> tuple[str, ...]:
+        """What people call the regions that there are now, region 1 first."""
+        return self.search.drawing.names or self.ground.names
+
+    def named(self, regions: Regions) -> tuple[str, ...]:
+        """What people are to call regions that come after those of now."""
+        return self.ground.named(regions, self.names())
+
+    def drawn(self) -> DrawnState:
+        """How the regions stand."""
+        drawing = self.search.drawing
+        return {"number": drawing.number, "words": drawing.words or None}
 
     # ---- what a run has to tell
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> RunState:
         """Where the search stands."""
         raise NotImplementedError
 
@@ -49,30 +96,70 @@ class BaseView:
 
     # ---- what follows from that
 
-    def place(self) -> dict[str, float]:
+    def place(self) -> PlaceState:
         """The most likely place."""
         place = self.search.place
         lat, lon = self.search.grid.frame.to_latlon(np.array([place.centroid]))[0]
-        return {"lat": float(lat), "lon": float(lon), "probability": place.probability}
+        where = (float(lat), float(lon))
+        how = self.settings.run.coordinates
+        return {
+            "lat": where[0],
+            "lon": where[1],
+            "probability": place.probability,
+            "written": written(where, how),
+        }
 
-    def footprint(self, pose: Pose | None) -> dict[str, Any]:
-        """The cells that a frame taken now shows, with their corners (north-west first, clockwise), how much of each is
-        covered, and what a look is worth there; p_tp and p_tn of the footprint are the settings'."""
-        nominal = {"p_tp": self.settings.sensor.p_tp, "p_tn": self.settings.sensor.p_tn}
+    def found_state(self, found: Found | None) -> FoundState | None:
+        """The place found as it is told."""
+        how = self.settings.run.coordinates
+        return found_state(found, how, confirmed=self.search.confirmed is not None)
+
+    def suspects(self) -> list[SuspectState]:
+        """What was seen and is not improbable."""
+        suspects = self.search.sightings.suspects(self.search.belief.probability())
+        return suspect_states(suspects, self.settings.run.coordinates)
+
+    def footprint(self, pose: FramePose | None, aircraft: str) -> FootprintState:
+        """The cells that a frame of an aircraft taken now shows, with their corners (north-west first, clockwise), how
+        much of each is covered, and what a look is worth there; p_tp and p_tn of the footprint are the settings'."""
+        whose = aircraft if aircraft in self.sensors else next(iter(self.sensors))
+        p_tp, p_tn = self._chances[whose]
+        shown: FootprintState = {
+            "counts": False, "covered": 0.0, "p_tp": p_tp, "p_tn": p_tn, "cells": [],
+        }  # fmt: skip
         if pose is None:
-            return {"counts": False, "covered": 0.0, **nominal, "cells": []}
-        footprint, frame = self.sensor.footprint(pose), self.search.grid.frame
+            return shown
+        footprint, frame = self.sensors[whose].footprint(pose), self.search.grid.frame
         corners = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
-        cells = []
         worth = (footprint.counts, footprint.covered, footprint.p_tp, footprint.p_tn)
         columns = [column.tolist() for column in (footprint.cells, *worth)]
-        for (row, col), counts, covered, p_tp, p_tn in zip(*columns, strict=True):
+        for (row, col), counts, covered, finds, clears in zip(*columns, strict=True):
             points = frame.to_latlon(np.vstack([[[row, col]], np.array([row, col]) + corners])).tolist()
             centre, around = points[0], points[1:]
-            where = {"row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around}
-            cells.append({**where, "counts": counts, "covered": covered, "p_tp": p_tp, "p_tn": p_tn})
-        best = float(footprint.covered.max(initial=0.0))
-        return {"counts": bool(footprint.counts.any()), "covered": best, **nominal, "cells": cells}
+            where: FootprintCell = {
+                "row": row, "col": col, "lat": centre[0], "lon": centre[1], "corners": around,
+                "counts": counts, "covered": covered, "p_tp": finds, "p_tn": clears,
+            }  # fmt: skip
+            shown["cells"].append(where)
+        shown["counts"] = bool(footprint.counts.any())
+        shown["covered"] = float(footprint.covered.max(initial=0.0))
+        return shown
+
+    def next(self, state: State, options: Sequence[Option]) -> NextState:
+        """What happens next, in words."""
+        return next_state(state, options, self.names(), self.region_masses())
+
+    def choices(self, options: Sequence[Option]) -> list[ChoiceState]:
+        """What the last decision weighed, as places with their names."""
+        return choices(options, self.names(), self.region_masses())
+
+    def above_ground(self, pose: FramePose | None) -> float | None:
+        """How high a pose is above the ground below it; above the launch point where the ground is taken as flat."""
+        relief = self.search.grid.relief
+        if pose is None or relief is None:
+            return None if pose is None else pose.height_m
+        below = float(relief.height_at(self.search.grid.frame.to_metres([(pose.lat, pose.lon)]))[0])
+        return pose.height_m - below if math.isfinite(below) else None
 
     def region_masses(self) -> list[float]:
         """The probability of each region of interest now, region 1 first."""
@@ -81,78 +168,51 @@ class BaseView:
         sums = np.bincount(regions.labels.ravel(), weights, minlength=regions.count + 1)
         return [float(mass) for mass in sums[1:]]
 
-    def map(self) -> dict[str, Any]:
-        """The belief and the probability of detection, cell by cell (null where nothing is searched)."""
-        grid = self.search.grid
-        searchable = grid.searchable
-
-        def cells(values: Any) -> list[list[float | None]]:
-            return [
-                [float(v) if s else None for v, s in zip(row, inside, strict=True)]
-                for row, inside in zip(values, searchable, strict=True)
-            ]
-
-        return {
-            "frame": grid.frame.to_dict(),
-            "corners": grid.frame.corners().tolist(),
-            "probability": cells(self.search.belief.probability()),
-            "pod": cells(self.search.record.pod()),
-            "regions": self.search.regions.labels.tolist(),
-            "outside": self.search.belief.outside,
-            "digest": self.search.belief.digest(),
-            "reports": self.state()["reports"]["accepted"],
-        }
-
-    def geojson(self) -> dict[str, Any]:
-        """The map for other programs: area, regions with their mass, cells, track, hits, the place found."""
-        grid, state = self.search.grid, self.state()
-        features = area_features(self.area, grid)
-        for outline in self._outlines:
-            number = outline["properties"]["number"]
-            mass = state["regions"][number - 1]
-            features.append(feature(outline["geometry"], "region", number=number, mass=mass))
-        features += cell_features(grid, self.search.belief.probability(), self.search.record.pod())
-        if len(self.track()) > 1:
-            features.append(feature(line(self.track()), "track"))
-        features += [feature(point(*hit), "hit") for hit in self.hits()]
-        if found := state["found"]:
-            place = point(found["lat"], found["lon"])
-            features.append(feature(place, "found", probability=found["probability"]))
-        return collection(features, pos=state["pos"], outside=state["outside"], time=state["time"])
+    def seen(self) -> Moment:
+        """What there is to see as it stands; its arrays are the search's own, to be copied by who keeps them."""
+        belief = self.search.belief
+        return Moment(
+            state=self.state(),
+            weights=belief.weights,
+            total=belief.total,
+            pod=self.search.record.pod(),
+            track=self.track(),
+            hits=self.hits(),
+            curve=(),
+        )
 
     def picture(self) -> Callable[[], bytes]:
         """What draws the map as it is now, as a PNG; drawing takes long, and may be left to another thread."""
-        state = self.state()
-        pose, found = state["pose"], state["found"]
-        said = f"POS {state['pos']:.0%}, {state['steps']} steps, {state['flight_time_s']:.0f} s in the air"
-        if found:
-            said += f" · found at {found['lat']:.6f}, {found['lon']:.6f}"
-            said += f" with probability {found['probability']:.4f}"
-        shown = {
-            "grid": self.search.grid,
-            "probability": self.search.belief.probability(),
-            "pod": self.search.record.pod(),
-            "labels": self.search.regions.labels,
-            "track": self.track(),
-            "ahead": state["ahead"],
-            "hits": tuple(self.hits()),
-            "aircraft": (pose["lat"], pose["lon"]) if pose else None,
-            "found": (found["lat"], found["lon"]) if found else None,
-            "title": f"{self.area.name}: {state['state']}",
-            "subtitle": said,
+        return partial(draw_map, self.ground_now(), self.seen().copied())
+
+
+def sortie_states(sorties: Sequence[SortieRow]) -> list[SortieState]:
+    """The flights that are over, as they are told."""
+    return [
+        {
+            "number": each.number,
+            "landed": each.landed,
+            "flight_time_s": each.seconds,
+            "steps": each.steps,
+            "pos": each.pos,
+            "why": each.why,
+            "system_id": each.system_id,
+            "autopilot": each.autopilot,
         }
+        for each in sorties
+    ]
 
-        def draw() -> bytes:
-            from service.view.picture import Scene, draw_scene  # matplotlib: it takes long to import, too
 
-            return draw_scene(Scene(**shown))
-
-        return draw
-
-    def scene(self) -> dict[str, Any]:
-        """What does not change during a run, for the page."""
-        return describe(self.area, self.search, self._outlines)
-
-    def searchable(self) -> NDArray[np.bool_]:
-        """The cells that are searched, [rows, cols]."""
-        return self.search.grid.searchable
+def news_states(news: Sequence[FieldNews]) -> list[NewsState]:
+    """The news that stand, as they are told."""
+    return [
+        {
+            "id": each.id,
+            "role": each.role,
+            "words": each.words,
+            "lat": each.place[0],
+            "lon": each.place[1],
+            "cells": len(each.cells),
+        }
+        for each in news
+    ]

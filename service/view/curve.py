@@ -17,6 +17,10 @@ class PosCurve:
         self.elapsed_s = 0.0
         self._last: float | None = None
 
+    def when(self, pos: float) -> float | None:
+        """Seconds spent searching until POS was this much; None when it never was."""
+        return next((seconds for seconds, reached in self.points if reached >= pos), None)
+
     def add(self, time: float, pos: float) -> None:
         """Note what POS is at a time (seconds since the epoch)."""
         if self._last is not None and 0.0 < time - self._last <= LONGEST_GAP_S:

@@ -11,11 +11,13 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from service.view.state import RunState
 
 STEPS_AN_OCTAVE = 8
 HEADROOM_OCTAVES = 7  # a hit of a good sensor lifts a cell by that much
@@ -32,13 +34,19 @@ class Moment:
         track, hits, curve: lists that only grow from moment to moment, unless time is set back.
     """
 
-    state: dict[str, Any]
+    state: RunState
     weights: NDArray[np.float64]
     total: float
     pod: NDArray[np.float64]
     track: Sequence[Sequence[float]]
     hits: Sequence[Sequence[float]]
     curve: Sequence[Sequence[float]]
+
+    def copied(self) -> Moment:
+        """This moment with arrays and lists of its own, to be looked at while the search goes on."""
+        track, hits, curve = list(self.track), list(self.hits), list(self.curve)
+        weights, pod = self.weights.copy(), self.pod.copy()
+        return replace(self, weights=weights, pod=pod, track=track, hits=hits, curve=curve)
 
 
 @dataclass

@@ -3,47 +3,102 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import math
 import time
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
 from prometheus_client import CollectorRegistry, Gauge, Histogram
 
 from service.area import SearchArea
 from service.clock import Clock
 from service.config import Settings
-from service.evidence.intake import Intake
-from service.evidence.observe import Pose, finite_or_level
-from service.evidence.reports import Receipt, Report
+from service.errors import BadInput, shown
+from service.evidence.counts import Counts
+from service.evidence.observe import FramePose, finite_or_level
+from service.evidence.reports import OrderReceipt, Receipt, Report
 from service.evidence.sensors import Profile
-from service.journal import read_last
-from service.mission.flight import LatLon
+from service.geometry import LatLon
+from service.known import Withdrawn
+from service.mavlink.modes import mode_title
 from service.mission.mission import Mission
-from service.mission.states import FINAL, State
+from service.mission.states import State
+from service.news.request import NewsRequest, refuse_other
 from service.search import Search
-from service.view.base import BaseView
+from service.squad import Squad
+from service.view.base import BaseView, news_states, sortie_states
 from service.view.curve import PosCurve
-from service.view.estimate import Estimator
+from service.view.estimate import Estimator, Searcher
 from service.view.feed import Moment
+from service.view.next import STATE_WORDS
+from service.view.state import (
+    AircraftState,
+    DetectorState,
+    EstimateState,
+    HeardState,
+    LinkState,
+    ReportsState,
+    RunState,
+    WindState,
+    option_states,
+    pose_state,
+    reports_state,
+    wind_state,
+)
 
 UNDER_WAY = (State.SEARCHING, State.CONFIRMING, State.HOLDING)
-LEAST_STEPS = 20  # so many cells have to be flown for their pace to tell something
+OF_EACH_AIRCRAFT: tuple[tuple[str, str, Callable[[Mission], float]], ...] = (
+    (
+        "roisearch_link_silent_seconds",
+        "Time since the autopilot's last heartbeat",
+        lambda mission: mission.clock.now() - mission.vehicle.telemetry.heartbeat_time,
+    ),
+    (
+        "roisearch_link_up",
+        "1 while the autopilot is heard",
+        lambda mission: float(link_state(mission)["up"]),
+    ),
+    (
+        "roisearch_link_quality",
+        "Part of the autopilot's last messages that arrived",
+        lambda mission: known_or_nan(mission.vehicle.received),
+    ),
+    (
+        "roisearch_battery_percent",
+        "State of charge as the autopilot tells it",
+        lambda mission: known_or_nan(mission.vehicle.telemetry.battery_percent),
+    ),
+    ("roisearch_steps", "Cells flown", lambda mission: mission.flight.steps),
+)
+"""What is measured of each aircraft, under the label of its name."""
 QUICK = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
 
 class RunView(BaseView):
-    """What can be seen of a run; `mission` and `intake` are there once the link is open."""
+    """What can be seen of a run.
+
+    The doors are open before the link is, so that a person sees what a service waits for: there is a view before there
+    is a mission. That is one field, `squad`, None until `begin`, and nothing else changes then. An object that stands
+    for 'no mission yet' would have to answer for twenty things of it, each of which is told plainly here beside what is
+    told of a mission. Of several aircraft the one that is told is the first that has not ended, beside the list of all.
+    """
 
     def __init__(
-        self, area: SearchArea, search: Search, sensor: Profile, settings: Settings, clock: Clock
+        self,
+        area: SearchArea,
+        search: Search,
+        sensors: Mapping[str, Profile],
+        settings: Settings,
+        clock: Clock,
     ) -> None:
-        super().__init__(area, search, sensor, settings)
+        super().__init__(area, search, sensors, settings)
         self.clock = clock
-        self.mission: Mission | None = None
-        self.intake: Intake | None = None
+        self.squad: Squad | None = None
+        self._hearing = asyncio.Lock()  # what is told twice in one moment counts once
         self.curve = PosCurve()
-        self.estimator = Estimator(search, time.monotonic)
+        self.estimator = Estimator(time.monotonic)
         self.registry = CollectorRegistry()
         self.latency = Histogram(
             "roisearch_hit_to_waypoint_seconds",
@@ -62,166 +117,259 @@ class RunView(BaseView):
         )
         for name, about, value in (
             ("roisearch_pos", "Probability of success so far", lambda: search.record.pos),
-            ("roisearch_belief_entropy_bits", "Entropy of the belief", search.belief.entropy),
+            ("roisearch_belief_entropy_bits", "Entropy of the belief", lambda: search.belief.entropy()),
             ("roisearch_reports_accepted", "Detector reports taken in", lambda: self._reports()["accepted"]),
             ("roisearch_reports_refused", "Detector reports refused", lambda: self._reports()["refused"]),
-            ("roisearch_link_silent_seconds", "Time since the autopilot's last heartbeat", self._link_age),
-            ("roisearch_link_up", "1 while the autopilot is heard", lambda: float(self._link()["up"])),
-            (
-                "roisearch_link_quality",
-                "Part of the autopilot's last messages that arrived",
-                self._link_quality,
-            ),
-            ("roisearch_battery_percent", "State of charge as the autopilot tells it", self._battery),
-            ("roisearch_steps", "Cells flown", lambda: self.mission.flight.steps if self.mission else 0),
             ("roisearch_tasks", "Tasks of the event loop", lambda: len(asyncio.all_tasks())),
         ):
             Gauge(name, about, registry=self.registry).set_function(value)
+        self._own = [
+            (Gauge(name, about, ["aircraft"], registry=self.registry), value)
+            for name, about, value in OF_EACH_AIRCRAFT
+        ]
+
+    def begin(self, squad: Squad) -> None:
+        """The links are open, and there are missions to look at."""
+        self.squad = squad
+        for gauge, value in self._own:
+            for name, mission in squad.missions.items():
+                gauge.labels(name).set_function(partial(value, mission))
+
+    @property
+    def mission(self) -> Mission | None:
+        """That of the only aircraft, or of the first that has not ended; None before there is one."""
+        return None if self.squad is None else self.squad.leading
 
     async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
         """Detector reports from a door."""
-        if self.intake is None:
+        if self.squad is None:
             why = "the service is still starting"
             return [Receipt(id=report.id, status="refused", reason=why) for report in reports]
-        return await self.intake.submit_all(reports)
+        return await self.squad.submit_all(reports)
 
-    async def order(self, command: str, place: tuple[float, float] | None = None) -> str:
-        """An operator's order from the door."""
-        return State.WAITING.value if self.mission is None else await self.mission.order(command, place)
+    async def order(
+        self,
+        command: str,
+        place: tuple[float, float] | None = None,
+        aircraft: str | None = None,
+        system_id: int | None = None,
+    ) -> OrderReceipt:
+        """An operator's order from the door. Raises BadInput when there is no such aircraft."""
+        if self.squad is None:
+            return OrderReceipt(state=State.WAITING.value, refused="the service is still starting")
+        return await self.squad.order(command, place, aircraft, system_id)
+
+    async def hear(self, request: NewsRequest) -> HeardState:
+        """News from a door; what comes again under its id changes nothing. Raises BadInput, JournalLost."""
+        async with self._hearing:
+            known = self.search.known
+            own = (f"news-{number}" for number in itertools.count(known.heard + 1))
+            name = request.id or next(each for each in own if known.heard_as(each) is None)
+            news = await asyncio.to_thread(request.news, self.search.grid, name)
+            if (before := known.heard_as(name)) is not None:
+                refuse_other(news, before, stands=before in known.news)
+                return {"id": name, "status": "duplicate", "cells": 0}
+            await self._begun().hear(news)
+            return {"id": name, "status": "accepted", "cells": len(news.cells)}
+
+    async def withdraw(self, name: str) -> HeardState:
+        """News are taken back. Raises BadInput, JournalLost."""
+        async with self._hearing:
+            standing = {news.id: len(news.cells) for news in self.search.known.news}
+            if name not in standing:
+                raise BadInput(
+                    f"there is no news {shown(name)} that could be taken back; /api/state tells which stand"
+                )
+            await self._begun().hear(Withdrawn(name))
+            return {"id": name, "status": "withdrawn", "cells": standing[name]}
+
+    def _begun(self) -> Squad:
+        if self.squad is None:
+            raise BadInput("the service is still starting; send it again in a moment")
+        return self.squad
+
+    def fingerprint(self) -> Callable[[], str]:
+        """What works out the digest of the belief as it is now; it may be left to another thread."""
+        return self.search.belief.copy().digest
 
     def ready(self) -> bool:
         """True while a search can take reports."""
-        return self.mission is not None and self.mission.state not in FINAL
+        return self.squad is not None and not self.squad.ended
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> RunState:
         """Where the search stands."""
         mission, record = self.mission, self.search.record
         telemetry = (
             mission.vehicle.telemetry if mission and mission.vehicle.telemetry.position_known else None
         )
-        pose = None
-        if telemetry is not None:
-            pose = Pose(
-                telemetry.lat,
-                telemetry.lon,
-                telemetry.alt_home_m,
-                telemetry.heading_deg if math.isfinite(telemetry.heading_deg) else 0.0,
-                telemetry.position_time,
-                finite_or_level(telemetry.pitch_deg),
-                finite_or_level(telemetry.roll_deg),
-            )
+        pose = pose_of(mission)
         flown = mission.flight_time() if mission else 0.0
-        found = mission.found if mission else None
+        found = self.squad.found if self.squad else None
+        state = mission.state if mission else State.WAITING
+        options = mission.reason.options if mission else ()
         return {
-            "state": mission.state if mission else State.WAITING,
-            "why": mission.why_here if mission else "",
+            "state": state,
+            "words": STATE_WORDS[state],
+            "why": mission.standing.why if mission else "",
+            "next": self.next(state, options),
+            "choices": self.choices(options),
             "area": self.area.name,
             "planner": self.settings.search.planner,
             "time": self.clock.now(),
             "speedup": self.clock.speedup,
             "pos": record.pos,
             "place": self.place(),
-            "suspects": self.search.sightings.suspects(self.search.belief.probability()),
+            "suspects": self.suspects(),
             "outside": self.search.belief.outside,
             "steps": mission.flight.steps if mission else 0,
             "flight_time_s": flown,
+            "sorties": sortie_states(mission.flight.sorties) if mission else [],
+            "news": news_states(self.search.known.news),
             "flight_left_s": self._flight_left(flown),
             "battery_percent": telemetry.battery_percent if telemetry else None,
-            "mode": telemetry.mode if telemetry else None,
+            "battery_doubt": (mission.core.battery_doubt if mission else "") or None,
+            "mode": mode_title(telemetry.mode) if telemetry else None,
             "reason": mission.reason.text if mission else "starting",
-            "options": mission.reason.rows() if mission else [],
-            "pose": vars(pose) if pose else None,
-            "footprint": self.footprint(pose),
+            "options": option_states(options),
+            "pose": pose_state(pose, self.settings.run.coordinates),
+            "height_above_ground_m": self._above_ground(),
+            "wind": self._wind(),
+            "footprint": self.footprint(pose, mission.name if mission else ""),
             "reports": self._reports(),
             "link": self._link(),
             "detector": self._detector(),
             "ahead": mission.ahead() if mission else [],
             "regions": self.region_masses(),
-            "found": vars(found) if found else None,
+            "drawn": self.drawn(),
+            "found": self.found_state(found),
+            "aircraft": [
+                self._aircraft(name, number, each)
+                for number, (name, each) in enumerate(self.squad.missions.items() if self.squad else ())
+            ],
         }
+
+    def _aircraft(self, name: str, number: int, mission: Mission) -> AircraftState:
+        """One of the aircraft, as it is told."""
+        t, pose = mission.vehicle.telemetry, pose_of(mission)
+        return {
+            "name": name,
+            "colour": number,
+            "state": mission.state,
+            "words": STATE_WORDS[mission.state],
+            "why": mission.standing.why,
+            "lat": pose.lat if pose else None,
+            "lon": pose.lon if pose else None,
+            "height": pose.height_m if pose else None,
+            "heading_deg": pose.heading_deg if pose else None,
+            "battery": t.battery_percent,
+            "link": link_state(mission),
+            "mode": mode_title(t.mode) if t.mode else None,
+            "next": self.next(mission.state, mission.reason.options),
+            "ahead": mission.ahead(),
+            "steps": mission.flight.steps,
+            "flight_time_s": mission.flight_time(),
+            "pose": pose_state(pose, self.settings.run.coordinates),
+            "footprint": self.footprint(pose, mission.name),
+        }
+
+    def _above_ground(self) -> float | None:
+        """Its height above the ground below it; None while it is not known."""
+        if self.mission is None or not self.mission.vehicle.telemetry.position_known:
+            return None
+        height = self.mission.core.helm.heights.above_ground(self.mission.vehicle.telemetry)
+        return height if math.isfinite(height) else None
+
+    def _wind(self) -> WindState | None:
+        """The wind; None while it is not known."""
+        wind = self.mission.core.reserve.wind if self.mission else None
+        return None if wind is None else wind_state(wind.north_mps, wind.east_mps)
 
     def track(self) -> list[LatLon]:
         """Where the aircraft was, one position a second."""
-        return [(lat, lon) for _, lat, lon, _ in self.mission.flight.track] if self.mission else []
+        return [(lat, lon) for _, lat, lon, _ in self._first.flight.track] if self._first else []
 
     def hits(self) -> list[LatLon]:
-        """Where the detector reported the target."""
-        return self.mission.flight.hits if self.mission else []
+        """Where the detectors reported the target: such lists only grow."""
+        return self.squad.hits if self.squad else []
 
-    def _reports(self) -> dict[str, int]:
-        intake = self.intake
-        return {"accepted": intake.accepted if intake else 0, "refused": intake.refused if intake else 0}
+    @property
+    def _first(self) -> Mission | None:
+        """The first mission, whether it has ended or not."""
+        return next(iter(self.squad.missions.values())) if self.squad else None
 
-    def _link(self) -> dict[str, Any]:
+    def _reports(self) -> ReportsState:
+        intake = self.mission.intake if self.mission else None
+        counts = self.squad.counts() if self.squad else Counts()
+        step = intake.moments.last_step if intake else ""
+        return reports_state(counts, self.search.doubt(), step)
+
+    def _link(self) -> LinkState:
         """Whether the autopilot is heard, how long ago, and how much of what it sends arrives."""
         if self.mission is None:
             return {"up": False, "silent_s": None, "received": None}
-        silent = self._link_age()
-        return {
-            "up": self.mission.helm.heard(),
-            "silent_s": silent if math.isfinite(silent) else None,
-            "received": self.mission.vehicle.received,
-        }
+        return link_state(self.mission)
 
-    def _detector(self) -> dict[str, Any]:
+    def _detector(self) -> DetectorState:
         """How long ago the detector reported; `silent` when that is long enough to hover."""
-        intake = self.intake
-        if intake is None or not intake.accepted or not intake.last_at:
+        mission = self.mission
+        intake = mission.intake if mission else None
+        if mission is None or intake is None or not intake.accepted or not intake.last_at:
             return {"silent_s": None, "silent": False}
         age = max(0.0, self.clock.now() - intake.last_at)
-        return {"silent_s": age, "silent": age > self.settings.sensor.silent_after_s}
-
-    def _link_age(self) -> float:
-        mission = self.mission
-        return self.clock.now() - mission.vehicle.telemetry.heartbeat_time if mission else math.inf
-
-    def _link_quality(self) -> float:
-        received = self.mission.vehicle.received if self.mission else None
-        return math.nan if received is None else received
-
-    def _battery(self) -> float:
-        percent = self.mission.vehicle.telemetry.battery_percent if self.mission else None
-        return math.nan if percent is None else percent
+        return {"silent_s": age, "silent": age > mission.core.settings.sensor.silent_after_s}
 
     def _flight_left(self, flown: float) -> float | None:
         """Seconds until the way home must begin, for the battery or the time; None while unknown."""
-        left = self.mission.homeward.energy.seconds_left(self.settings.flight) if self.mission else None
+        left = self.mission.energy.seconds_left(self.settings.flight) if self.mission else None
         return None if left is None else min(left, max(0.0, self.settings.flight.max_flight_s - flown))
-
-    def decisions(self, count: int) -> list[dict[str, Any]]:
-        """The last decisions with their reasons and options, the newest first, from the journal."""
-        if self.mission is None:
-            return []
-        rows = read_last(self.mission.journal.path, "decision", count)
-        return [{"time": row.time, **row.body} for row in rows]
-
-    async def moment_at(self, at: float) -> Moment:
-        """A live run only knows now."""
-        return self.moment()
 
     def moment(self) -> Moment:
         """What there is to see now, for the page."""
-        search, state = self.search, self.state()
-        state["estimate"] = self._estimate(state["flight_time_s"])
-        return Moment(
-            state=state,
-            weights=search.belief.weights,
-            total=search.belief.total,
-            pod=search.record.pod(),
-            track=self.track(),
-            hits=self.hits(),
-            curve=self.curve.points,
-        )
+        seen = self.seen()
+        estimate = self._estimate(seen.state["flight_time_s"])
+        return replace(seen, state={**seen.state, "estimate": estimate}, curve=self.curve.points)
 
-    def _estimate(self, flown: float) -> dict[str, Any] | None:
-        """When how much POS is to be expected; None while the aircraft is not searching."""
+    def _estimate(self, flown: float) -> EstimateState | None:
+        """When how much POS is to be expected; None while no aircraft is searching."""
         mission = self.mission
-        if mission is None or mission.state not in UNDER_WAY:
+        if mission is None or self.squad is None:
             return None
-        forecast = self.estimator.latest(mission.helm.cell()[0], mission.helm.heading(), flown)
-        if forecast is None:
+        crew = [each for each in self.squad.missions.values() if each.state in UNDER_WAY]
+        if not crew:
             return None
-        steps, flight = mission.flight.steps, self.settings.flight
-        usual = self.search.grid.frame.cell_m / flight.speed_mps
-        pace = flown / steps if steps >= LEAST_STEPS else usual
-        return forecast.to_goals(self.search.record.pos, flown, pace)
+        since = self.clock.now() if self.squad.several else flown  # no flight of theirs is that of all
+        forecast = self.estimator.latest(
+            [Searcher(each.search, each.cell(), each.heading()) for each in crew], since
+        )
+        return None if forecast is None else forecast.to_goals(self.search.record.pos, since)
+
+
+def known_or_nan(value: float | None) -> float:
+    """A number that may be unknown, as a metric has it."""
+    return math.nan if value is None else value
+
+
+def pose_of(mission: Mission | None) -> FramePose | None:
+    """Where an aircraft is, metres above its launch; None while that is not known."""
+    if mission is None or not mission.vehicle.telemetry.position_known:
+        return None
+    telemetry = mission.vehicle.telemetry
+    return FramePose(
+        telemetry.lat,
+        telemetry.lon,
+        telemetry.alt_home_m,
+        telemetry.heading_deg if math.isfinite(telemetry.heading_deg) else 0.0,
+        telemetry.position_time,
+        finite_or_level(telemetry.pitch_deg),
+        finite_or_level(telemetry.roll_deg),
+    )
+
+
+def link_state(mission: Mission) -> LinkState:
+    """Whether an autopilot is heard, how long ago, and how much of what it sends arrives."""
+    silent = mission.clock.now() - mission.vehicle.telemetry.heartbeat_time
+    return {
+        "up": mission.heard(),
+        "silent_s": silent if math.isfinite(silent) else None,
+        "received": mission.vehicle.received,
+    }

@@ -2,55 +2,52 @@
 
 from __future__ import annotations
 
-import copy
 from bisect import bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from prometheus_client import CollectorRegistry
 
-from roisearch import Belief
-from roisearch.detection import DetectionRecord
-from service.evidence.observe import Observation, Pose
-from service.evidence.reports import Receipt, Report
-from service.evidence.sensors import make_sensor
-from service.evidence.suspects import Sightings
-from service.journal import Row
-from service.mission.flight import LatLon
-from service.mission.states import FINAL, FLYING, State
+from service.config import ONLY, each_aircraft
+from service.drawing import Drawing
+from service.entries import understanding
+from service.evidence.counts import Counts
+from service.evidence.cover import sensors_over
+from service.evidence.found import Found
+from service.evidence.images import Images
+from service.evidence.observe import finite_or_level
+from service.geometry import LatLon
+from service.known import Known
+from service.mavlink.modes import mode_title
+from service.mission.states import FLYING
 from service.resume import retrace, stored_run
+from service.rows import DecisionRow, ReportRow
 from service.search import Search
-from service.view.base import BaseView
+from service.story import FlightSoFar, StoriesSoFar
+from service.survey import JOURNAL
+from service.view.base import BaseView, news_states, sortie_states
 from service.view.curve import PosCurve
 from service.view.feed import Moment
+from service.view.next import STATE_WORDS
+from service.view.state import AircraftState, RunState, option_states, pose_state, reports_state
 
 KEPT = 32  # copies of the belief along the run, to go back to
-TRACK_EVERY_S = 1.0
 AFTER_RESTART_S = 0.1
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Told:
-    """What the journal has told up to a row; the lists only grow, so a time is a length of each."""
+    """What the journal has told up to a row, by the names of aircraft; lists only grow, so a time is a length of each.
+    `track` is that of the first aircraft."""
 
-    state: str = State.WAITING.value
-    why: str = ""
-    mode: str | None = None
-    reason: str = "starting"
-    options: list[dict[str, Any]] = field(default_factory=list)
-    path: list[list[int]] = field(default_factory=list)
-    found: dict[str, Any] | None = None
-    pose: Pose | None = None
-    reports: int = 0
-    decisions: int = 0
-    began: float | None = None
-    ended: float | None = None
-    track: int = 0
-    hits: int = 0
-    curve: int = 1
+    flights: dict[str, FlightSoFar]
+    leading: FlightSoFar
+    found: Found | None
+    track: int
+    hits: int
+    curve: int
 
 
 @dataclass(frozen=True)
@@ -58,9 +55,8 @@ class _Kept:
     """The search before a row."""
 
     row: int
-    belief: Belief
-    record: DetectionRecord
-    sightings: Sightings
+    known: Known
+    drawing: Drawing
 
 
 class ReplayView(BaseView):
@@ -73,15 +69,15 @@ class ReplayView(BaseView):
     def __init__(self, folder: Path) -> None:
         settings, area, grid, self.rows = stored_run(folder)
         search = Search(grid, settings)
-        super().__init__(area, search, make_sensor(settings, grid), settings)
+        super().__init__(area, search, sensors_over(grid, settings), settings)
+        self.images = Images(folder)
         self.registry = CollectorRegistry()
         self.times = monotone([row.time for row in self.rows])
-        self._track: list[LatLon] = []
-        self._hits: list[LatLon] = []
         self._curve = PosCurve()
         self._told: list[_Told] = []
+        self._hits: list[LatLon] = []
         self._kept: list[_Kept] = []
-        self._read()
+        self._read(folder / JOURNAL)
         self._at = len(self.rows)
 
     # ---- time
@@ -100,150 +96,137 @@ class ReplayView(BaseView):
         goal = max(1, bisect_right(self.times, time))
         if goal < self._at:
             kept = self._kept[bisect_right(self._kept, goal, key=lambda each: each.row) - 1]
-            self.search.go_back(kept.belief.copy(), copy.deepcopy(kept.record), copy.deepcopy(kept.sightings))
+            self.search.go_back(kept.known.copy())
+            self.search.take_drawing(kept.drawing)
             self._at = kept.row
-        for row in self.rows[self._at : goal]:
-            retrace(row, self.search)
+        for entry in self.rows[self._at : goal]:
+            retrace(entry, self.search)
         self._at = goal
 
-    def _read(self) -> None:
+    def _read(self, journal: Path) -> None:
         """Go through the journal once: what was told after each row, and copies of the belief now and then."""
-        every = max(1, len(self.rows) // KEPT)
-        told, tracked = _Told(), -np.inf
-        for number, (row, time) in enumerate(zip(self.rows, self.times, strict=True)):
+        every, frame = max(1, len(self.rows) // KEPT), self.search.grid.frame
+        stories = StoriesSoFar(each_aircraft(self.settings))
+        for number, (entry, time) in enumerate(zip(self.rows, self.times, strict=True)):
             if number % every == 0:
-                belief, record, sightings = self.search.belief, self.search.record, self.search.sightings
-                self._kept.append(
-                    _Kept(number, belief.copy(), copy.deepcopy(record), copy.deepcopy(sightings))
-                )
-            retrace(row, self.search)
-            told = copy.copy(told)
-            if row.kind == "report":
-                if time - tracked >= TRACK_EVERY_S:
-                    self._track.append((row.body["pose"][0], row.body["pose"][1]))
-                    tracked = time
-                self._take_report(told, row, time)
-            else:
-                take(told, row, time)
-            told.track, told.hits, told.curve = len(self._track), len(self._hits), len(self._curve.points)
-            self._told.append(told)
-
-    def _take_report(self, told: _Told, row: Row, time: float) -> None:
-        told.reports += 1
-        lat, lon, height_m, heading_deg = row.body["pose"][:4]
-        told.pose = Pose(lat, lon, height_m, heading_deg, time)
-        if row.body["observation"] is None:
-            return
-        observation = Observation.from_dict(row.body["observation"])
-        places = self.search.grid.frame.to_latlon(observation.cells[observation.hits])
-        self._hits += [(float(lat), float(lon)) for lat, lon in places]
-        self._curve.add(time, self.search.record.pos)
+                self._kept.append(_Kept(number, self.search.known.copy(), self.search.drawing))
+            with understanding(journal, entry.seq, entry.said.kind):
+                retrace(entry, self.search)
+                stories.take(replace(entry, time=time), frame)
+            if isinstance(entry.said, ReportRow) and entry.said.observation is not None:
+                self._curve.add(time, self.search.record.pos)
+            lengths = len(_first(stories.flights).track), len(stories.hits), len(self._curve.points)
+            self._told.append(_Told(dict(stories.flights), stories.leading, stories.found, *lengths))
+        self._hits = stories.hits
 
     # ---- what there is to see
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> RunState:
         """Where the search stood; what a journal does not hold is None."""
-        told, now, frame = self._told[self._at - 1], self.times[self._at - 1], self.search.grid.frame
-        flown = 0.0 if told.began is None else (told.ended or now) - told.began
-        ahead: list[LatLon] = []
-        if told.state in FLYING and told.path:
-            ahead = [(float(lat), float(lon)) for lat, lon in frame.to_latlon(np.array(told.path))]
+        told, now = self._told[self._at - 1], self.times[self._at - 1]
+        flight = told.leading
+        decision, pose = flight.decision, flight.pose
         return {
-            "state": told.state,
-            "why": told.why,
+            "state": flight.state,
+            "words": STATE_WORDS[flight.state],
+            "why": flight.why,
+            "next": self.next(flight.state, () if decision is None else decision.options),
+            "choices": self.choices(() if decision is None else decision.options),
             "area": self.area.name,
             "planner": self.settings.search.planner,
             "time": now,
             "speedup": 1.0,
             "pos": self.search.record.pos,
             "place": self.place(),
-            "suspects": self.search.sightings.suspects(self.search.belief.probability()),
+            "suspects": self.suspects(),
             "outside": self.search.belief.outside,
-            "steps": told.decisions,
-            "flight_time_s": flown,
+            "steps": flight.steps,
+            "flight_time_s": flight.flown_s,
+            "sorties": sortie_states(flight.sorties),
+            "news": news_states(self.search.known.news),
             "flight_left_s": None,
             "battery_percent": None,
-            "mode": told.mode,
-            "reason": told.reason,
-            "options": told.options,
-            "pose": vars(told.pose) if told.pose else None,
-            "footprint": self.footprint(told.pose if told.state in FLYING else None),
-            "reports": {"accepted": told.reports, "refused": 0},
+            "battery_doubt": None,
+            "mode": flight.mode and mode_title(flight.mode),
+            "reason": "starting" if decision is None else decision.reason,
+            "options": option_states(() if decision is None else decision.options),
+            "pose": pose_state(pose, self.settings.run.coordinates),
+            "height_above_ground_m": self.above_ground(pose),
+            "wind": None,
+            "footprint": self.footprint(
+                pose, next(name for name, each in told.flights.items() if each is flight)
+            ),
+            "reports": reports_state(Counts(accepted=sum(each.reports for each in told.flights.values()))),
             "link": None,
             "detector": None,
-            "ahead": ahead,
+            "ahead": self._ahead(flight),
             "regions": self.region_masses(),
-            "found": told.found,
+            "drawn": self.drawn(),
+            "found": self.found_state(told.found),
+            "aircraft": [
+                self._aircraft(name, number, each) for number, (name, each) in enumerate(told.flights.items())
+            ],
+        }
+
+    def _ahead(self, flight: FlightSoFar) -> list[LatLon]:
+        """Where an aircraft was going to."""
+        decision, pose = flight.decision, flight.pose
+        if flight.state not in FLYING or decision is None or not decision.path:
+            return []
+        cells = self.search.grid.frame.to_latlon(np.array(decision.path))
+        ahead = [(float(lat), float(lon)) for lat, lon in cells]
+        return ahead if pose is None else [(pose.lat, pose.lon), *ahead]
+
+    def _aircraft(self, name: str, number: int, flight: FlightSoFar) -> AircraftState:
+        """One of the aircraft, as it was when it last reported."""
+        pose = flight.pose
+        return {
+            "name": name or ONLY,
+            "colour": number,
+            "state": flight.state,
+            "words": STATE_WORDS[flight.state],
+            "why": flight.why,
+            "lat": pose.lat if pose else None,
+            "lon": pose.lon if pose else None,
+            "height": pose.height_m if pose else None,
+            "heading_deg": finite_or_level(pose.heading_deg) if pose else None,
+            "battery": None,
+            "link": None,
+            "mode": flight.mode and mode_title(flight.mode),
+            "next": self.next(flight.state, () if flight.decision is None else flight.decision.options),
+            "ahead": self._ahead(flight),
+            "steps": flight.steps,
+            "flight_time_s": flight.flown_s,
+            "pose": pose_state(pose, self.settings.run.coordinates),
+            "footprint": self.footprint(pose, name),
         }
 
     def track(self) -> list[LatLon]:
         """Where the aircraft was when it reported, one position a second."""
-        return self._track[: self._told[self._at - 1].track]
+        told = self._told[self._at - 1]
+        return [(lat, lon) for _, lat, lon, _ in _first(told.flights).track[: told.track]]
 
     def hits(self) -> list[LatLon]:
         """Where the detector reported the target."""
         return self._hits[: self._told[self._at - 1].hits]
 
     def moment(self) -> Moment:
-        """What there was to see at the end."""
-        return self._moment(self.times[-1])
-
-    async def moment_at(self, at: float) -> Moment:
-        """What there was to see at a time."""
-        return self._moment(at)
-
-    def _moment(self, time: float) -> Moment:
-        self.seek(time)
-        return Moment(
-            state=self.state(),
-            weights=self.search.belief.weights,
-            total=self.search.belief.total,
-            pod=self.search.record.pod(),
-            track=self.track(),
-            hits=self.hits(),
-            curve=self._curve.points[: self._told[self._at - 1].curve],
-        )
+        """What there was to see at the time that is set."""
+        curve = self._curve.points[: self._told[self._at - 1].curve]
+        return replace(self.seen(), curve=curve)
 
     def decisions(self, count: int) -> list[dict[str, Any]]:
         """The last decisions until the time, the newest first."""
         made = [
-            {"time": time, **row.body}
-            for row, time in zip(self.rows[: self._at], self.times, strict=False)
-            if row.kind == "decision"
+            {"time": time, **entry.said.body()}
+            for entry, time in zip(self.rows[: self._at], self.times, strict=False)
+            if isinstance(entry.said, DecisionRow)
         ]
         return made[::-1][:count]
 
-    # ---- what a replay does not do
 
-    def ready(self) -> bool:
-        """A replay takes no reports."""
-        return False
-
-    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
-        """A replay takes no reports."""
-        return [Receipt(id=each.id, status="refused", reason="this is a replay") for each in reports]
-
-    async def order(self, command: str, place: LatLon | None = None) -> str:
-        """A replay takes no orders."""
-        return self._told[-1].state
-
-
-def take(told: _Told, row: Row, time: float) -> None:
-    """Take in a row that is not a report."""
-    body = row.body
-    if row.kind == "transition":
-        told.state, told.why = body["to"], body["reason"]
-        if told.began is None and told.state in (State.TAKEOFF, *FLYING):
-            told.began = time
-        told.ended = time if told.state in FINAL else None
-    elif row.kind == "decision":
-        told.decisions += 1
-        told.reason, told.path = body["reason"], body["path"]
-        told.options = body.get("options", [])
-    elif row.kind == "mode":
-        told.mode = body["mode"]
-    elif row.kind == "found":
-        told.found = body
+def _first(flights: dict[str, FlightSoFar]) -> FlightSoFar:
+    return next(iter(flights.values()))
 
 
 def monotone(times: list[float]) -> list[float]:

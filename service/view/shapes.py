@@ -61,10 +61,9 @@ def region_features(grid: Grid, labels: NDArray[np.integer[Any]]) -> list[dict[s
 
 
 def cell_features(
-    grid: Grid, probability: NDArray[np.float64], pod: NDArray[np.float64]
+    grid: Grid, probability: NDArray[np.float64], pod: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> list[dict[str, Any]]:
-    """Every cell that is searched, as a square with its probability and its POD."""
-    cells = np.argwhere(grid.searchable)
+    """Cells, int [k, 2], as squares with their probability and their POD."""
     around = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])  # row, col; counter-clockwise seen from above
     corners = (cells[:, None, :] + around[None, :, :]).reshape(-1, 2)[:, ::-1] * grid.frame.cell_m
     rings = np.round(grid.frame.from_metres(corners)[:, ::-1], DIGITS).reshape(-1, 5, 2).tolist()

@@ -5,10 +5,9 @@ from __future__ import annotations
 import copy
 import math
 import random
-from typing import Any, ClassVar
+from typing import Any
 
 from sim.autopilot.behaviours import (
-    Behaviour,
     FollowSetpoints,
     FollowSticks,
     GoTo,
@@ -17,34 +16,15 @@ from sim.autopilot.behaviours import (
     Stand,
     TakeOff,
 )
-from sim.autopilot.commands import ACCEPTED, DENIED, FAILED, UNSUPPORTED, Command, Result, Results, whole
+from sim.autopilot.commands import ACCEPTED, DENIED, FAILED, UNSUPPORTED, ReceivedCommand, Results, whole
 from sim.autopilot.dialect import M
 from sim.autopilot.firmware import CRITICAL, FORCE, INFO, WARNING, Firmware
-from sim.autopilot.motion import Limits
-from sim.autopilot.parameter_tables import ARDUCOPTER_PARAMETERS
-from sim.autopilot.parameters import REAL32, Parameter
+from sim.autopilot.flavors import ARDUCOPTER
+from sim.autopilot.parameters import REAL32
 from sim.autopilot.plan import FlyPlan
-from sim.autopilot.vehicle import Landed, Point
+from sim.autopilot.vehicle import Behaviour, Landed, Point
 
-_NUMBERS = {
-    "STABILIZE": 0,
-    "ACRO": 1,
-    "ALT_HOLD": 2,
-    "AUTO": 3,
-    "GUIDED": 4,
-    "LOITER": 5,
-    "RTL": 6,
-    "CIRCLE": 7,
-    "LAND": 9,
-    "POSHOLD": 16,
-    "BRAKE": 17,
-    "SMART_RTL": 21,
-}
-_MODES: dict[str, tuple[int, int]] = {
-    name: (81 if name in ("STABILIZE", "ACRO", "ALT_HOLD") else 89, number)
-    for name, number in _NUMBERS.items()
-}
-_MODE_OF = {number: name for name, number in _NUMBERS.items()}
+_MODE_OF = {number: name for name, (_, number) in ARDUCOPTER.modes.items()}
 _ARMABLE = ("STABILIZE", "ACRO", "ALT_HOLD", "GUIDED", "LOITER", "POSHOLD", "AUTO")
 _STICK_MODES = ("STABILIZE", "ACRO", "ALT_HOLD", "LOITER", "POSHOLD")
 _NEED_POSITION = ("AUTO", "GUIDED", "LOITER", "RTL", "CIRCLE", "POSHOLD", "BRAKE", "SMART_RTL")
@@ -57,43 +37,7 @@ _EARLY = (0.40, 0.55)  # of the time from boot to ready: the pre-arm bit reads h
 class ArduCopter(Firmware):
     """ArduCopter 4.7.0-dev as its SITL quad answers on the first port."""
 
-    autopilot = M.MAV_AUTOPILOT_ARDUPILOTMEGA
-    version = 4 << 24 | 7 << 16
-    capabilities = 64495 & ~M.MAV_PROTOCOL_CAPABILITY_FTP  # the recorded bits, without the file transfer
-    limits = Limits(
-        cruise=10.0,
-        accelerate=2.9,
-        brake=1.17,
-        jerk=6.2,
-        position_gain=0.94,
-        velocity_gain=1.32,
-        lag=0.28,
-        climb=2.5,
-        descend=1.5,
-        vertical_accelerate=2.5,
-        yaw_rate=90.0,
-    )
-    boot_mode, guided_mode, return_mode, land_mode = "STABILIZE", "GUIDED", "RTL", "LAND"
-    heartbeat_modes = _MODES
-    default_streams_hz: ClassVar = {}
-    unknown_request, unknown_interval = (Result.FAILED,), (Result.DENIED,)
-    requests_interval_message = True
-    heartbeat_on_mode_change = True
-    prearm_bit_everywhere = True
-    fence_frame = M.MAV_FRAME_GLOBAL
-    plan_is_asked_int = False
-    refuses_wrong_seq = True
-    upload_retry_s, upload_timeout_s = 1.0, 8.0
-    parameters_as_bits, tells_index_by_name, echoes_when_changed = False, False, 1
-    serves_data_streams = True
-    reboot_refusal, pilot_mode = FAILED, "LOITER"
-    target_fields = (M.MAV_FRAME_GLOBAL, 65016, False)
-    cells = 3
-    critical_battery = ("BATT_FS_CRT_ACT", {"warn": 0.0, "land": 1.0, "return": 2.0})
-    vtol_state = M.MAV_VTOL_STATE_MC
-    position_error_m, velocity_error_mps = 0.05, 0.02
-    landing_takes_s, disarm_after_landing_s = 1.6, 0.5
-    home_share = 0.8
+    flavor = ARDUCOPTER
 
     def boot(self) -> None:
         self._too_early = random.Random(self.settings.seed).random() < 2 / 3
@@ -103,6 +47,7 @@ class ArduCopter(Firmware):
         self._fence_on = False
         self._velocity_at: float | None = None
         self._setpoints = FollowSetpoints()
+        self._steers_to_place = False  # GUIDED's position control runs
         self._boot_texts = [
             (0.0, "Barometer 1 calibration complete"),
             (0.0, "Barometer 2 calibration complete"),
@@ -119,9 +64,6 @@ class ArduCopter(Firmware):
 
     def kind_after_set(self, kind: int) -> int:
         return REAL32
-
-    def parameter_table(self) -> list[Parameter]:
-        return ARDUCOPTER_PARAMETERS
 
     def hears(self, system: int, component: int) -> bool:
         return system in (0, self.settings.sysid)
@@ -160,7 +102,7 @@ class ArduCopter(Firmware):
         return self.holding()
 
     def _climb_to(self, up: float) -> TakeOff:
-        return TakeOff(up, spool_s=2.6, slow_below=0.0, slow_climb=self.limits.climb)
+        return TakeOff(up, spool_s=2.6, slow_below=0.0, slow_climb=self.flavor.limits.climb)
 
     def _landing(self, place: tuple[float, float] | None) -> Land:
         return Land(fast=1.5, slow=0.5, slow_below=10.0, place=place)
@@ -171,7 +113,7 @@ class ArduCopter(Firmware):
         land = self._landing((home.north, home.east))
         return Return(home, height, wait_s=5.0, land=land, say=lambda text: None)
 
-    def on_set_mode(self, command: Command) -> Results:
+    def on_set_mode(self, command: ReceivedCommand) -> Results:
         if not whole(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return DENIED
         return ACCEPTED if self._enter(whole(command.param2)) else FAILED
@@ -197,7 +139,7 @@ class ArduCopter(Firmware):
         return True
 
     # ---- commands
-    def on_arm(self, command: Command) -> Results:
+    def on_arm(self, command: ReceivedCommand) -> Results:
         vehicle = self.vehicle
         force = command.param2 == FORCE
         if command.param1 == 0.0:
@@ -220,8 +162,8 @@ class ArduCopter(Firmware):
             return "System not initialised"
         if self.mode not in _ARMABLE:
             return f"{self.mode} mode not armable"
-        if not self.ready:
-            return "Need Position Estimate"
+        if self.arming_refusal is not None or not self.ready:
+            return self.arming_refusal or self.flavor.not_ready_text
         sticks = vehicle.sticks
         if (
             self.mode in ("GUIDED", "AUTO")
@@ -231,15 +173,16 @@ class ArduCopter(Firmware):
             return "Throttle (RC3) is not neutral"
         return None
 
-    def on_takeoff(self, command: Command) -> Results:
+    def on_takeoff(self, command: ReceivedCommand) -> Results:
         vehicle = self.vehicle
         if not vehicle.armed or self.mode != "GUIDED" or vehicle.flying or not 0 < command.z < math.inf:
             return FAILED
         if not vehicle.stuck:
+            self._steers_to_place = False
             vehicle.behaviour = self._climb_to(self.home_or_here().up + command.z)
         return ACCEPTED
 
-    def on_reposition(self, command: Command) -> Results:
+    def on_reposition(self, command: ReceivedCommand) -> Results:
         vehicle = self.vehicle
         if command.frame is None:
             return UNSUPPORTED
@@ -259,36 +202,49 @@ class ArduCopter(Firmware):
         if self._fence_on and self.breaches_fence(north, east):
             return FAILED
         if vehicle.flying and not vehicle.stuck:
-            self._velocity_at = None
             self.failsafe = False
-            self.set_mode("GUIDED", GoTo(Point(north, east, up)))
+            self.set_mode("GUIDED")
+            self._steer_to(GoTo(Point(north, east, up)))
         elif self.mode != "GUIDED" and not vehicle.stuck:
             self.set_mode("GUIDED")
         return ACCEPTED
 
+    def _steer_to(self, leg: GoTo) -> None:
+        """Fly to a place in GUIDED. Its position control begins with the default speed, whatever was asked before."""
+        self._velocity_at = None
+        if not self._steers_to_place:
+            self._steers_to_place = True
+            self.vehicle.speed_limit = None
+        self.vehicle.behaviour = leg
+
+    def set_mode(self, mode: str, behaviour: Behaviour | None = None) -> None:
+        if mode != self.mode:
+            self._steers_to_place = False
+        super().set_mode(mode, behaviour)
+
     @staticmethod
-    def _is_place(command: Command) -> bool:
+    def _is_place(command: ReceivedCommand) -> bool:
         place = command.place_e7
         if place is None or (place[0] == 0 and place[1] == 0):
             return False
         return abs(place[0]) <= 90e7 and abs(place[1]) <= 180e7
 
-    def on_change_speed(self, command: Command) -> Results:
+    def on_change_speed(self, command: ReceivedCommand) -> Results:
         if not command.param2 > 0:
             return DENIED
         self.vehicle.speed_limit = min(command.param2, 20.0)
         return ACCEPTED
 
-    def on_fence_enable(self, command: Command) -> Results:
+    def on_fence_enable(self, command: ReceivedCommand) -> Results:
         if command.param1 not in (0.0, 1.0, 2.0):
             return FAILED
         self._fence_on = command.param1 == 1.0
         return ACCEPTED
 
-    def on_mission_start(self, command: Command) -> Results:
+    def on_mission_start(self, command: ReceivedCommand) -> Results:
         if len(self.plan.mission) < 2 or not self.vehicle.armed:
             return FAILED
-        if not self._enter(_NUMBERS["AUTO"]):
+        if not self._enter(ARDUCOPTER.modes["AUTO"][1]):
             return FAILED
         return ACCEPTED
 
@@ -301,10 +257,11 @@ class ArduCopter(Firmware):
         if position is not None:
             if self._fence_on and self.breaches_fence(position.north, position.east):
                 return
-            self._velocity_at = None
             if vehicle.behaviour.target != position or not isinstance(vehicle.behaviour, GoTo):
-                vehicle.behaviour = GoTo(position, yaw=yaw)
+                self._steer_to(GoTo(position, yaw=yaw))
+            self._velocity_at = None
         elif velocity is not None:
+            self._steers_to_place = False
             self._setpoints.position, self._setpoints.velocity = None, velocity
             self._setpoints.yaw, self._velocity_at = yaw, vehicle.time
             vehicle.behaviour = self._setpoints

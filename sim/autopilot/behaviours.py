@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 
 from sim.autopilot.motion import Demand
-from sim.autopilot.vehicle import Landed, Point, Vehicle
+from sim.autopilot.vehicle import Behaviour, Landed, Point, Vehicle
 
 _ARRIVED_M = 1.0
 
@@ -18,23 +18,6 @@ _ARRIVED_M = 1.0
 def bearing(north: float, east: float) -> float:
     """Compass direction of a displacement, degrees."""
     return math.degrees(math.atan2(east, north)) % 360.0
-
-
-class Behaviour:
-    """One thing a vehicle does."""
-
-    lifts = False  # may leave the ground
-    landed: Landed = Landed.IN_AIR  # the landed state reported while it is in the air doing this
-    done = False
-
-    def steer(self, vehicle: Vehicle, demand: Demand) -> None:
-        """Write what the body should do in this step."""
-        raise NotImplementedError
-
-    @property
-    def target(self) -> Point | None:
-        """Where it is going, if that can be said."""
-        return None
 
 
 class Stand(Behaviour):

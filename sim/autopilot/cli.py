@@ -9,16 +9,21 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from sim.autopilot import control
 from sim.autopilot.address import Address
 from sim.autopilot.core import FIRMWARES, Autopilot
-from sim.autopilot.faults import Fault, read_faults
+from sim.autopilot.faults import Fault, describe, read_faults
+from sim.autopilot.geo import LocalFrame
+from sim.autopilot.ground import Flat, read_ground
+from sim.autopilot.lockstep import Lockstep
 from sim.autopilot.settings import Settings
 from sim.autopilot.transport import Driver, Mock
 
 _DEFAULTS = Settings()
+_APART_M = 5.0  # aircraft that start in a row
 
 
 def _numbers(count: int) -> Callable[[str], tuple[float, ...]]:
@@ -39,6 +44,13 @@ def _address(text: str) -> Address:
         return Address.parse(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _lockstep(text: str) -> Lockstep:
+    try:
+        return Lockstep(Path(text))
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"no time can be kept in '{text}': {error.strerror}") from None
 
 
 def _host_port(text: str) -> tuple[str, int]:
@@ -65,6 +77,14 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--heading", type=float, default=0.0, help="degrees at boot")
     p.add_argument("--speedup", type=float, default=1.0, help="times faster than the wall clock, up to 100")
     p.add_argument("--sysid", type=int, default=1)
+    p.add_argument(
+        "--aircraft",
+        type=int,
+        default=1,
+        metavar="N",
+        help="so many on the same addresses, with the next system ids, 5 m east of one another; faults and control "
+        "are the first one's",
+    )
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--ready-after", type=float, default=_DEFAULTS.ready_after_s, help="seconds from boot")
     p.add_argument(
@@ -74,9 +94,25 @@ def parser() -> argparse.ArgumentParser:
         "--wind", type=_numbers(2), default=(0.0, 0.0), metavar="NORTH,EAST", help="m/s of the air"
     )
     p.add_argument("--gust", type=float, default=0.0, help="m/s, standard deviation of the gusts")
+    p.add_argument(
+        "--ground", type=Path, metavar="FILE", help="heights of the ground: a raster; default flat"
+    )
+    p.add_argument("--rangefinder", action="store_true", help="it has a distance sensor that looks down")
+    p.add_argument(
+        "--swap-battery", type=float, metavar="SECONDS", help="disarmed for so long it gets a full battery"
+    )
     p.add_argument("--epoch", type=float, help="time of day at boot, seconds since 1970; default now")
     p.add_argument("--attached", action="store_true", help="end when standard input closes")
     p.add_argument("--faults", type=Path, metavar="FILE", help="TOML file of faults")
+    p.add_argument(
+        "--list-faults", action="store_true", help="say what a file of faults can ask for, and end"
+    )
+    p.add_argument(
+        "--lockstep",
+        type=_lockstep,
+        metavar="FILE",
+        help="keep the time there, and wait for who follows it (256 bytes, zero; made if missing)",
+    )
     p.add_argument("--control", type=_host_port, metavar="HOST:PORT", help="control socket (loopback only)")
     return p
 
@@ -94,8 +130,25 @@ def settings_of(args: argparse.Namespace) -> Settings:
         endurance_s=args.endurance * 60.0,
         wind_mps=args.wind,
         gust_mps=args.gust,
+        ground=Flat() if args.ground is None else read_ground(args.ground, args.home),
+        rangefinder=args.rangefinder or args.ground is not None,
+        swap_battery_s=args.swap_battery,
         epoch_s=time.time() if args.epoch is None else args.epoch,
     )
+
+
+def beside_one_another(settings: Settings, count: int) -> list[Settings]:
+    """Settings for so many vehicles in a row."""
+    frame, altitude = LocalFrame(settings.home[0], settings.home[1]), settings.home[2]
+    every = [settings]
+    for k in range(1, count):
+        latitude, longitude = frame.to_e7(0.0, _APART_M * k)
+        ground = settings.ground.from_home(0.0, _APART_M * k)
+        home = (latitude * 1e-7, longitude * 1e-7, altitude)
+        every.append(
+            replace(settings, sysid=settings.sysid + k, seed=settings.seed + k, home=home, ground=ground)
+        )
+    return every
 
 
 def _stop_with_standard_input(stop: asyncio.Event) -> None:
@@ -116,6 +169,8 @@ async def _serve(
     faults: list[Fault],
     control_at: tuple[str, int] | None,
     attached: bool,
+    aircraft: int,
+    lockstep: Lockstep | None,
 ) -> int:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -123,10 +178,10 @@ async def _serve(
         _stop_with_standard_input(stop)
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
-    mock = Mock(Autopilot(settings))
+    mock = Mock(*(Autopilot(each) for each in beside_one_another(settings, aircraft)))
     for fault in faults:
         mock.autopilot.faults.add(fault)
-    driver = Driver([mock], settings.speedup)
+    driver = Driver([mock], settings.speedup, lockstep)
     server: asyncio.Server | None = None
     try:
         for address in listen:
@@ -157,14 +212,22 @@ def main(arguments: list[str]) -> int:
     """Run until SIGTERM or SIGINT; 0 then, 2 for bad input."""
     p = parser()
     args = p.parse_args(arguments)
+    if args.list_faults:
+        print(describe())
+        return 0
     if not 0.01 <= args.speedup <= 100:
         p.error("--speedup is from 0.01 to 100")
     if not 1 <= args.sysid <= 255:
         p.error("--sysid is from 1 to 255")
+    if not 1 <= args.aircraft <= 256 - args.sysid:
+        p.error(f"--aircraft is from 1 to {256 - args.sysid} with --sysid {args.sysid}")
     try:
         faults = [] if args.faults is None else read_faults(args.faults)
+        settings = settings_of(args)
     except ValueError as error:
         print(f"roisearch-sim autopilot: {error}", file=sys.stderr)
         return 2
     listen = args.listen or [Address("udpin", "127.0.0.1", 14540)]
-    return asyncio.run(_serve(settings_of(args), listen, faults, args.control, args.attached))
+    return asyncio.run(
+        _serve(settings, listen, faults, args.control, args.attached, args.aircraft, args.lockstep)
+    )

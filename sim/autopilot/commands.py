@@ -35,7 +35,7 @@ def whole(value: float) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class ReceivedCommand:
     """One command. `frame` is None when it came as COMMAND_LONG, whose place is in degrees."""
 
     number: int
@@ -49,13 +49,13 @@ class Command:
     frame: int | None
 
     @staticmethod
-    def of(message: Any) -> Command:
+    def of(message: Any) -> ReceivedCommand:
         """The command in a COMMAND_LONG or COMMAND_INT message."""
         if message.get_msgId() == M.MAVLINK_MSG_ID_COMMAND_INT:
             place = (message.x, message.y, message.z, message.frame)
         else:
             place = (message.param5, message.param6, message.param7, None)
-        return Command(
+        return ReceivedCommand(
             message.command, message.param1, message.param2, message.param3, message.param4, *place
         )
 

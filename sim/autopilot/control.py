@@ -4,6 +4,7 @@
     {"clear": "gps_lost"} or {"clear": null}          end the faults of a kind, or all
     {"state": null}                                   the truth about the vehicle
     {"speedup": 20}                                   times faster than the wall clock
+    {"replace": {"flavor": "px4", "sysid": 7}}        another vehicle in its place, on the same lines
 
 Each line is answered by one: {"ok": true, ...} or {"error": "what is wrong"}. It is for tests and
 demonstrations on one machine, and listens on the loopback interface only.
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import socket
 from collections.abc import Callable
 from types import TracebackType
@@ -20,6 +22,8 @@ from typing import Any
 
 from sim.autopilot.core import Autopilot
 from sim.autopilot.faults import Fault
+
+WORDS = "fault, clear, state, speedup, replace"
 
 
 def state_of(autopilot: Autopilot) -> dict[str, Any]:
@@ -39,6 +43,10 @@ def state_of(autopilot: Autopilot) -> dict[str, Any]:
         "north": body.north,
         "east": body.east,
         "up": body.up,
+        "heading": body.yaw % 360.0,
+        "above_ground": body.up - vehicle.ground.height(body.north, body.east),
+        "crashed": vehicle.crashed,
+        "least_clearance": vehicle.least_clearance if math.isfinite(vehicle.least_clearance) else None,
         "speed": body.speed,
         "battery_percent": vehicle.battery.percent,
         "faults": autopilot.faults.active,
@@ -50,7 +58,7 @@ def answer(autopilot: Autopilot, line: bytes, set_speedup: Callable[[float], Non
     try:
         asked = json.loads(line)
         if not isinstance(asked, dict) or len(asked) != 1:
-            raise ValueError("want one of: fault, clear, state, speedup")
+            raise ValueError(f"want one of: {WORDS}")
         (word, value), *_ = asked.items()
         if word == "fault":
             autopilot.faults.add(Fault.of(value if isinstance(value, dict) else {}))
@@ -62,11 +70,21 @@ def answer(autopilot: Autopilot, line: bytes, set_speedup: Callable[[float], Non
             if not isinstance(value, int | float) or not 0.01 <= value <= 100:
                 raise ValueError("speedup is from 0.01 to 100")
             set_speedup(float(value))
+        elif word == "replace":
+            _replace(autopilot, value)
         else:
-            raise ValueError(f"no '{word}'; there are: fault, clear, state, speedup")
+            raise ValueError(f"no '{word}'; there are: {WORDS}")
     except ValueError as error:
         return {"error": str(error)}
     return {"ok": True}
+
+
+def _replace(autopilot: Autopilot, value: Any) -> None:
+    match value:
+        case {"flavor": str(flavor), "sysid": int(sysid), **rest} if not rest:
+            autopilot.replace(flavor, sysid)
+        case _:
+            raise ValueError('replace wants a flavor and a sysid: {"flavor": "px4", "sysid": 7}')
 
 
 async def serve(
@@ -134,6 +152,10 @@ class Control:
         """The truth about the vehicle."""
         state: dict[str, Any] = self.ask(state=None)["state"]
         return state
+
+    def replace(self, flavor: str, sysid: int) -> None:
+        """Put another vehicle in its place, on the same lines."""
+        self.ask(replace={"flavor": flavor, "sysid": sysid})
 
     def speedup(self, factor: float) -> None:
         """Run so many times faster than the wall clock."""

@@ -4,10 +4,10 @@ A file has one `[[fault]]` table for each:
 
     [[fault]]
     kind = "gps_lost"
-    at = 90.0            # seconds after boot, or `after_takeoff = 20.0`
+    at = 90.0            # seconds after boot, or `after_arming = 0.0`, or `after_takeoff = 20.0`
     seconds = 15.0       # then it is over; without it, it stays
 
-`KINDS` says which kinds there are and what else each can be told.
+`roisearch-sim autopilot --list-faults` says which kinds there are and what else each can be told.
 """
 
 from __future__ import annotations
@@ -16,14 +16,12 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.autopilot.fault_kinds import KINDS, Options
+from sim.autopilot.host import Host
 
-if TYPE_CHECKING:
-    from sim.autopilot.core import Autopilot
-
-_TIMES = ("at", "after_takeoff", "seconds")
+_TIMES = ("at", "after_arming", "after_takeoff", "seconds")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +31,7 @@ class Fault:
     kind: str
     options: Options
     at: float | None = None
+    after_arming: float | None = None
     after_takeoff: float | None = None
     seconds: float | None = None
 
@@ -58,6 +57,7 @@ class Fault:
             else:
                 known = ", ".join([*defaults, *_TIMES])
                 raise ValueError(f"a fault of kind '{kind}' has no '{key}'; it has: {known}")
+        KINDS[kind].check(options)
         return Fault(kind, options, **times)
 
 
@@ -66,6 +66,22 @@ def _checked(kind: str, key: str, value: Any, default: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, wanted):
         raise ValueError(f"'{key}' of a fault of kind '{kind}' should be like {default!r}, not {value!r}")
     return float(value) if isinstance(default, float) else value
+
+
+def describe() -> str:
+    """Every kind of fault with what it can be told, for whoever writes a file of them."""
+    lines = [
+        __doc__.partition("\n\n`")[0].strip(),
+        "",
+        "The kinds, with what each can be told and the defaults:",
+    ]
+    for name, kind in sorted(KINDS.items()):
+        lines += ["", f"{name}: {kind.about}"]
+        for option, default in kind.options.items():
+            choices = f"  # {' | '.join(kind.choices[option])}" if option in kind.choices else ""
+            shown = str(default) if isinstance(default, int | float) else f'"{default}"'
+            lines.append(f"    {option} = {shown}{choices}")
+    return "\n".join(lines)
 
 
 def read_faults(path: Path) -> list[Fault]:
@@ -90,12 +106,12 @@ class _Active:
 class Faults:
     """The faults of one mock: those to come and those that are there."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(self, autopilot: Host) -> None:
         self._autopilot = autopilot
         self._coming: list[Fault] = []
         self._active: list[_Active] = []
+        self._armed_at: float | None = None
         self._took_off_at: float | None = None
-        self._reboot_at: float | None = None
 
     @property
     def active(self) -> list[str]:
@@ -104,7 +120,7 @@ class Faults:
 
     def add(self, fault: Fault) -> None:
         """Let a fault come when its time comes, or now."""
-        if fault.at is None and fault.after_takeoff is None:
+        if fault.at is fault.after_arming is fault.after_takeoff is None:
             self._begin(fault)
         else:
             self._coming.append(fault)
@@ -115,23 +131,15 @@ class Faults:
         for each in [each for each in self._active if kind in (None, each.fault.kind)]:
             self._end(each)
 
-    def reboot_soon(self) -> None:
-        """Reboot once the acknowledgement is out."""
-        self._reboot_at = self._autopilot.clock + 0.5
-
     def tick(self) -> None:
         """Ten times a second: begin, go on, end."""
         autopilot, now = self._autopilot, self._autopilot.clock
-        if self._reboot_at is not None and now >= self._reboot_at:
-            self._reboot_at = None
-            autopilot.reboot()
+        if self._armed_at is None and autopilot.vehicle.armed:
+            self._armed_at = now
         if self._took_off_at is None and autopilot.vehicle.flying:
             self._took_off_at = now
         for fault in tuple(self._coming):
-            since, wait = (
-                (0.0, fault.at) if fault.at is not None else (self._took_off_at, fault.after_takeoff)
-            )
-            if since is not None and wait is not None and now >= since + wait:
+            if self._is_due(fault, now):
                 self._coming.remove(fault)
                 self._begin(fault)
         for each in tuple(self._active):
@@ -139,6 +147,14 @@ class Faults:
                 self._end(each)
             elif each.step is not None:
                 each.step()
+
+    def _is_due(self, fault: Fault, now: float) -> bool:
+        waits = (
+            (0.0, fault.at),
+            (self._armed_at, fault.after_arming),
+            (self._took_off_at, fault.after_takeoff),
+        )
+        return any(since is not None and wait is not None and now >= since + wait for since, wait in waits)
 
     def _begin(self, fault: Fault) -> None:
         autopilot, kind = self._autopilot, KINDS[fault.kind]

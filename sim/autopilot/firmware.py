@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, ClassVar
 
-from sim.autopilot.behaviours import Behaviour, GoTo, Hold, Stand
-from sim.autopilot.commands import ACCEPTED, UNSUPPORTED, Command, Results, whole
+from sim.autopilot.behaviours import GoTo, Hold, Stand
+from sim.autopilot.commands import ACCEPTED, UNSUPPORTED, ReceivedCommand, Results, whole
 from sim.autopilot.dialect import M
 from sim.autopilot.fence import Fence
-from sim.autopilot.motion import Limits
-from sim.autopilot.parameters import Parameter, ParameterStore
+from sim.autopilot.flavors import Flavor
+from sim.autopilot.parameters import ParameterStore
 from sim.autopilot.plan import Plan
 from sim.autopilot.settings import Settings
-from sim.autopilot.vehicle import Landed, Point, Vehicle
+from sim.autopilot.vehicle import Behaviour, Landed, Point, Vehicle
 
 FORCE = 21196.0  # param2 of COMPONENT_ARM_DISARM: do it whatever the checks say
 INFO, WARNING, CRITICAL, EMERGENCY = 6, 4, 2, 0  # MAV_SEVERITY
-GPS_TIMEOUT_S = 3.0  # without GPS the estimate is worth nothing after this long
+RECKONS_S = 3.0  # without GPS the estimate is worth nothing after this long
 
 
 def link_floor_s(speedup: float) -> float:
@@ -37,63 +37,30 @@ def link_floor_s(speedup: float) -> float:
 class Firmware(ABC):
     """One flavour's mind. Times are vehicle time in seconds."""
 
-    # ---- what a flavour is
-    autopilot: ClassVar[int]  # MAV_AUTOPILOT
-    version: ClassVar[int]  # AUTOPILOT_VERSION.flight_sw_version
-    capabilities: ClassVar[int]  # MAV_PROTOCOL_CAPABILITY bits
-    limits: ClassVar[Limits]
-    boot_mode: ClassVar[str]
-    guided_mode: ClassVar[str]
-    return_mode: ClassVar[str]
-    land_mode: ClassVar[str]
-    default_streams_hz: ClassVar[Mapping[int, float]]
-    unknown_request: ClassVar[Results]  # REQUEST_MESSAGE for an id it does not know
-    unknown_interval: ClassVar[Results]  # SET_MESSAGE_INTERVAL for an id it does not know
-    requests_interval_message: ClassVar[bool]  # REQUEST_MESSAGE may ask for MESSAGE_INTERVAL
-    heartbeat_on_mode_change: ClassVar[bool]
-    heartbeat_modes: ClassVar[Mapping[str, tuple[int, int]]]  # mode -> base_mode bits, custom_mode
-    prearm_bit_everywhere: ClassVar[bool]  # also in SYS_STATUS present and enabled
-    fence_frame: ClassVar[int]  # frame of downloaded fence items
-    plan_is_asked_int: ClassVar[bool]  # switches to MISSION_REQUEST_INT once it has seen an _INT item
-    refuses_wrong_seq: ClassVar[bool]  # MISSION_ACK INVALID_SEQUENCE for an item that was not asked for
-    upload_retry_s: ClassVar[float]
-    upload_timeout_s: ClassVar[float]
-    parameters_as_bits: ClassVar[bool]  # integers as raw bits in the float field
-    tells_index_by_name: ClassVar[bool]  # param_index of an answer to a read by name
-    echoes_when_changed: ClassVar[int]  # PARAM_VALUE messages after a PARAM_SET that changed the value
-    serves_data_streams: ClassVar[bool]  # REQUEST_DATA_STREAM
-    reboot_refusal: ClassVar[Results]  # while armed
-    pilot_mode: ClassVar[str]  # the mode a pilot takes over with
-    target_fields: ClassVar[tuple[int, int, bool]]  # POSITION_TARGET: frame, type mask, silent on the ground
-    cells: ClassVar[int]  # battery
-    critical_battery: ClassVar[tuple[str, dict[str, float]]]  # the parameter, and its values by action
-    position_error_m: ClassVar[float]
-    velocity_error_mps: ClassVar[float]
-    vtol_state: ClassVar[int] = 0
-    landing_takes_s: ClassVar[float]  # touch-down until ON_GROUND
-    home_share: ClassVar[float]  # of the time from boot to ready, until home is set
-    idle_disarm_s: ClassVar[float] = 10.0
+    flavor: ClassVar[Flavor]
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.vehicle = Vehicle(
             settings,
-            self.limits,
-            error_m=self.position_error_m,
-            error_mps=self.velocity_error_mps,
-            cells=self.cells,
+            self.flavor.limits,
+            error_m=self.flavor.position_error_m,
+            error_mps=self.flavor.velocity_error_mps,
+            cells=self.flavor.cells,
         )
         self.vehicle.behaviour = Stand()
-        self.mode = self.boot_mode
+        self.mode = self.flavor.boot_mode
         self.failsafe = False
         self.link_floor_s = link_floor_s(settings.speedup)
-        self.parameters = ParameterStore(self.parameter_table())
+        self.parameters = ParameterStore(self.flavor.parameters)
         self.plan, self.fence = Plan(), Fence()
         self.ready = False
         self.companion_heard_at: float | None = None
         self.gps_lost_at: float | None = None
+        self.reckons_s = RECKONS_S
+        self.arming_refusal: str | None = None  # a fault: why it does not arm although it says it is ready
         self.mode_changed: Callable[[], None] = lambda: None
-        self.handlers: dict[int, Callable[[Command], Results]] = {
+        self.handlers: dict[int, Callable[[ReceivedCommand], Results]] = {
             M.MAV_CMD_COMPONENT_ARM_DISARM: self.on_arm,
             M.MAV_CMD_NAV_TAKEOFF: self.on_takeoff,
             M.MAV_CMD_NAV_LAND: self.on_land,
@@ -110,10 +77,6 @@ class Firmware(ABC):
 
     # ---- the interface a flavour fills in
     @abstractmethod
-    def parameter_table(self) -> list[Parameter]:
-        """Name, type and default of the parameters it has."""
-
-    @abstractmethod
     def behaviour_of(self, mode: str) -> Behaviour:
         """What the vehicle does on entering a mode."""
 
@@ -126,19 +89,19 @@ class Firmware(ABC):
         """Does it take a message from this sender?"""
 
     @abstractmethod
-    def on_arm(self, command: Command) -> Results:
+    def on_arm(self, command: ReceivedCommand) -> Results:
         """COMPONENT_ARM_DISARM."""
 
     @abstractmethod
-    def on_takeoff(self, command: Command) -> Results:
+    def on_takeoff(self, command: ReceivedCommand) -> Results:
         """NAV_TAKEOFF."""
 
     @abstractmethod
-    def on_reposition(self, command: Command) -> Results:
+    def on_reposition(self, command: ReceivedCommand) -> Results:
         """DO_REPOSITION."""
 
     @abstractmethod
-    def on_set_mode(self, command: Command) -> Results:
+    def on_set_mode(self, command: ReceivedCommand) -> Results:
         """DO_SET_MODE."""
 
     @abstractmethod
@@ -146,7 +109,7 @@ class Firmware(ABC):
         """The SET_MODE message."""
 
     @abstractmethod
-    def on_change_speed(self, command: Command) -> Results:
+    def on_change_speed(self, command: ReceivedCommand) -> Results:
         """DO_CHANGE_SPEED."""
 
     @abstractmethod
@@ -156,7 +119,7 @@ class Firmware(ABC):
         """A position or velocity setpoint (SET_POSITION_TARGET_*), in the home frame."""
 
     @abstractmethod
-    def on_mission_start(self, command: Command) -> Results:
+    def on_mission_start(self, command: ReceivedCommand) -> Results:
         """MISSION_START."""
 
     @abstractmethod
@@ -200,7 +163,7 @@ class Firmware(ABC):
         return kind
 
     # ---- what both do alike
-    def handle(self, command: Command) -> Results:
+    def handle(self, command: ReceivedCommand) -> Results:
         """Obey one command and say how it is acknowledged."""
         handler = self.handlers.get(command.number)
         if handler is None:
@@ -239,21 +202,21 @@ class Firmware(ABC):
                 vehicle.behaviour = Stand()
             self.disarmed(landed)
 
-    def on_land(self, command: Command) -> Results:
+    def on_land(self, command: ReceivedCommand) -> Results:
         """NAV_LAND."""
-        self.set_mode(self.land_mode)
+        self.set_mode(self.flavor.land_mode)
         return ACCEPTED
 
-    def on_return(self, command: Command) -> Results:
+    def on_return(self, command: ReceivedCommand) -> Results:
         """NAV_RETURN_TO_LAUNCH."""
-        self.set_mode(self.return_mode)
+        self.set_mode(self.flavor.return_mode)
         return ACCEPTED
 
-    def on_fence_enable(self, command: Command) -> Results:
+    def on_fence_enable(self, command: ReceivedCommand) -> Results:
         """DO_FENCE_ENABLE."""
         return UNSUPPORTED
 
-    def on_set_home(self, command: Command) -> Results:
+    def on_set_home(self, command: ReceivedCommand) -> Results:
         """DO_SET_HOME: to where it is, or to a place."""
         vehicle = self.vehicle
         place = command.place_e7
@@ -274,15 +237,15 @@ class Firmware(ABC):
         self.set_mode(mode)
         self.failsafe = True
 
-    def on_reboot(self, command: Command) -> Results:
+    def on_reboot(self, command: ReceivedCommand) -> Results:
         """PREFLIGHT_REBOOT_SHUTDOWN: only while disarmed."""
-        return self.reboot_refusal if self.vehicle.armed else ACCEPTED
+        return self.flavor.reboot_refusal if self.vehicle.armed else ACCEPTED
 
     @abstractmethod
     def on_breach(self, forced: bool) -> None:
         """It has left the fence; `forced`: come home whatever the parameters say."""
 
-    def on_set_current(self, command: Command) -> Results:
+    def on_set_current(self, command: ReceivedCommand) -> Results:
         """DO_SET_MISSION_CURRENT."""
         return ACCEPTED if self.plan.select(whole(command.param1)) else UNSUPPORTED
 
@@ -295,14 +258,14 @@ class Firmware(ABC):
     def position_known(self) -> bool:
         """Does the vehicle know where it is?"""
         lost = self.gps_lost_at
-        known = lost is None or self.vehicle.time - lost < GPS_TIMEOUT_S
+        known = lost is None or self.vehicle.time - lost < self.reckons_s
         return known and not self.vehicle.estimator.bad and self.vehicle.home is not None
 
     def home_or_here(self) -> Point:
         """Home, or the place of take-off before there is one."""
         return self.vehicle.home or Point(0.0, 0.0, 0.0)
 
-    def place(self, command: Command) -> tuple[float, float] | None:
+    def place(self, command: ReceivedCommand) -> tuple[float, float] | None:
         """Metres north and east of a command's place; None is "here"."""
         place = command.place_e7
         return None if place is None else self.vehicle.frame.from_e7(*place)
@@ -325,7 +288,7 @@ class Firmware(ABC):
         time = vehicle.time
         if (
             vehicle.home is None
-            and time >= self.home_share * self.settings.ready_after_s
+            and time >= self.flavor.home_share * self.settings.ready_after_s
             and not vehicle.gps.lost
         ):
             vehicle.home = Point(vehicle.seen.north, vehicle.seen.east, 0.0)
@@ -334,6 +297,9 @@ class Firmware(ABC):
                 self.gps_lost_at = time
         else:
             self.gps_lost_at = None
+        if vehicle.crashed and vehicle.armed:
+            vehicle.say(EMERGENCY, "Crash: Disarming")
+            self.disarm("Motors stopped", landed=False)
         if vehicle.battery.charge <= 0.0 and vehicle.flying:
             vehicle.say(EMERGENCY, "Battery is empty")
             self.disarm("Motors stopped", landed=False)
@@ -349,17 +315,18 @@ class Firmware(ABC):
         if not vehicle.body.on_ground:
             vehicle.landed = vehicle.behaviour.landed
         elif vehicle.flew:
-            if time - vehicle.touched_at >= self.landing_takes_s and vehicle.landed != Landed.ON_GROUND:
+            if (
+                time - vehicle.touched_at >= self.flavor.landing_takes_s
+                and vehicle.landed != Landed.ON_GROUND
+            ):
                 vehicle.landed = Landed.ON_GROUND
                 self.landing_seen()
-            if time - vehicle.touched_at >= self.landing_takes_s + self.disarm_after_landing_s:
+            if time - vehicle.touched_at >= self.flavor.landing_takes_s + self.flavor.disarm_after_landing_s:
                 self.disarm(self.disarm_text(landed=True), landed=True)
         else:
             vehicle.landed = Landed.ON_GROUND
-            if time - vehicle.armed_at >= self.idle_disarm_s:
+            if time - vehicle.armed_at >= self.flavor.idle_disarm_s:
                 self.disarm(self.disarm_text(landed=False), landed=False)
-
-    disarm_after_landing_s: ClassVar[float]
 
     @abstractmethod
     def landing_seen(self) -> None:

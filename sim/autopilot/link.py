@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.autopilot.dialect import M
+from sim.autopilot.host import Host
 from sim.autopilot.telemetry import BUILDERS
 from sim.autopilot.trouble import Radio, is_ack
-
-if TYPE_CHECKING:
-    from sim.autopilot.core import Autopilot
+from sim.autopilot.voice import in_mavlink1
 
 _NEVER = 2**62
 _HEARTBEAT = int(M.MAVLINK_MSG_ID_HEARTBEAT)
@@ -27,23 +26,27 @@ class _Stream:
 class Link:
     """Bytes in, messages out; messages in, bytes out. `outbox` holds whole frames to be carried."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(self, autopilot: Host) -> None:
         self._autopilot = autopilot
-        self._codec = M.MAVLink(None, srcSystem=autopilot.settings.sysid, srcComponent=1)
-        self._codec.robust_parsing = True
         self.outbox: list[bytes] = []
         self.out = Radio(autopilot.trouble, autopilot.chance, self.outbox_append)
         self.into = Radio(autopilot.trouble, autopilot.chance, lambda data: autopilot.take(self, data))
-        self.shaky = False  # goes through the radios
+        self.shaky = autopilot.trouble.any  # goes through the radios
         self._streams: dict[int, _Stream] = {}
         self._due = _NEVER
+        self.begin()
+
+    def begin(self) -> None:
+        """A vehicle speaks here for the first time, by its own name."""
+        self._codec = M.MAVLink(None, srcSystem=self._autopilot.settings.sysid, srcComponent=1)
+        self._codec.robust_parsing = True
         self.reset()
 
     def reset(self) -> None:
         """The rates of a vehicle that has just booted."""
         self._streams.clear()
         self.set_interval(_HEARTBEAT, 1_000_000)
-        for number, rate in self._autopilot.firmware.default_streams_hz.items():
+        for number, rate in self._autopilot.firmware.flavor.default_streams_hz.items():
             self.set_interval(number, round(1e6 / rate))
 
     # ---- sending
@@ -53,8 +56,13 @@ class Link:
 
     def send(self, message: Any) -> None:
         """Put one message in the outbox."""
-        self._post(message.pack(self._codec))
-        self._codec.seq = (self._codec.seq + 1) % 256  # so that the other side can tell what was lost
+        message = self._autopilot.voice.utter(message)
+        if message is None:
+            return
+        frame = in_mavlink1(message, self._codec) if self._autopilot.old_wire else message.pack(self._codec)
+        if frame is not None:
+            self._post(frame)
+            self._codec.seq = (self._codec.seq + 1) % 256  # so that the other side can tell what was lost
 
     def send_as(self, message: Any, system: int, component: int) -> None:
         """Put a message of somebody else on the same wire in the outbox."""
@@ -63,7 +71,9 @@ class Link:
     def _post(self, frame: bytes) -> None:
         if not self.shaky:
             self.outbox.append(frame)
-        elif not (self._autopilot.trouble.acks_lost and is_ack(frame)):
+            return
+        trouble = self._autopilot.trouble
+        if not trouble.mute and not (trouble.acks_lost and is_ack(frame)):
             self.out.put(frame, self._autopilot.clock)
 
     def shake(self) -> None:
@@ -81,7 +91,7 @@ class Link:
     def set_interval(self, number: int, interval_us: int) -> None:
         """Send a message at an interval from now on; 0 is the flavour's default, below 0 is off."""
         if interval_us == 0:
-            rate = self._autopilot.firmware.default_streams_hz.get(
+            rate = self._autopilot.firmware.flavor.default_streams_hz.get(
                 number, 1.0 if number == _HEARTBEAT else 0.0
             )
             interval_us = round(1e6 / rate) if rate else -1

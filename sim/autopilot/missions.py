@@ -7,13 +7,10 @@ wrong number; both are told by the firmware's class attributes and hooks.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.autopilot.dialect import M
-
-if TYPE_CHECKING:
-    from sim.autopilot.core import Autopilot
-    from sim.autopilot.link import Link
+from sim.autopilot.host import Host, Line
 
 _ACCEPTED = M.MAV_MISSION_ACCEPTED
 
@@ -22,7 +19,7 @@ _ACCEPTED = M.MAV_MISSION_ACCEPTED
 class _Upload:
     """An upload under way."""
 
-    link: Link
+    link: Line
     system: int
     component: int
     kind: int
@@ -35,7 +32,7 @@ class _Upload:
 class Missions:
     """The vehicle's side of the mission protocol on all links."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(self, autopilot: Host) -> None:
         self._autopilot = autopilot
         self._upload: _Upload | None = None
         self._asks_int = False
@@ -51,7 +48,7 @@ class Missions:
             M.MAVLINK_MSG_ID_MISSION_ACK: self._on_ack,
         }
 
-    def _ack(self, link: Link, to: Any, result: int, kind: int) -> None:
+    def _ack(self, link: Line, to: Any, result: int, kind: int) -> None:
         system, component = to
         link.send(M.MAVLink_mission_ack_message(system, component, result, kind))
 
@@ -60,7 +57,7 @@ class Missions:
         upload.asked_at = self._autopilot.vehicle.time
         upload.link.send(make(upload.system, upload.component, len(upload.items), upload.kind))
 
-    def _on_count(self, link: Link, message: Any) -> None:
+    def _on_count(self, link: Line, message: Any) -> None:
         to, now = (message.get_srcSystem(), message.get_srcComponent()), self._autopilot.vehicle.time
         if message.mission_type not in self._autopilot.firmware.plan.items:
             self._ack(link, to, M.MAV_MISSION_UNSUPPORTED, message.mission_type)
@@ -72,17 +69,17 @@ class Missions:
         self._upload = _Upload(link, *to, message.mission_type, message.count, now, now)
         self._ask(self._upload)
 
-    def _on_item(self, link: Link, message: Any) -> None:
+    def _on_item(self, link: Line, message: Any) -> None:
         upload, firmware = self._upload, self._autopilot.firmware
         if upload is None or upload.link is not link or message.mission_type != upload.kind:
             return
         upload.heard_at = self._autopilot.vehicle.time
         if message.get_msgId() == M.MAVLINK_MSG_ID_MISSION_ITEM:
             message = _as_int(message)
-        elif firmware.plan_is_asked_int:
+        elif firmware.flavor.plan_is_asked_int:
             self._asks_int = True
         if message.seq != len(upload.items):
-            if firmware.refuses_wrong_seq:
+            if firmware.flavor.refuses_wrong_seq:
                 to = (upload.system, upload.component)
                 self._ack(link, to, M.MAV_MISSION_INVALID_SEQUENCE, upload.kind)
                 self._ask(upload)
@@ -105,7 +102,7 @@ class Missions:
         if kind == M.MAV_MISSION_TYPE_FENCE:
             firmware.fence.load(items)
 
-    def _on_request_list(self, link: Link, message: Any) -> None:
+    def _on_request_list(self, link: Line, message: Any) -> None:
         items = self._autopilot.firmware.plan.items.get(message.mission_type, [])
         link.send(
             M.MAVLink_mission_count_message(
@@ -113,7 +110,7 @@ class Missions:
             )
         )
 
-    def _on_request(self, link: Link, message: Any) -> None:
+    def _on_request(self, link: Line, message: Any) -> None:
         firmware, kind = self._autopilot.firmware, message.mission_type
         items = firmware.plan.items.get(kind, [])
         to = (message.get_srcSystem(), message.get_srcComponent())
@@ -122,7 +119,7 @@ class Missions:
             return
         each = items[message.seq]
         is_fence = kind == M.MAV_MISSION_TYPE_FENCE
-        frame = firmware.fence_frame if is_fence else each.frame
+        frame = firmware.flavor.fence_frame if is_fence else each.frame
         place: tuple[float, float] = (each.x, each.y)
         make = M.MAVLink_mission_item_int_message
         if message.get_msgId() == M.MAVLINK_MSG_ID_MISSION_REQUEST:
@@ -146,7 +143,7 @@ class Missions:
             )
         )
 
-    def _on_clear(self, link: Link, message: Any) -> None:
+    def _on_clear(self, link: Line, message: Any) -> None:
         kinds = (0, 1, 2) if message.mission_type == M.MAV_MISSION_TYPE_ALL else (message.mission_type,)
         self._upload = None
         for kind in kinds:
@@ -155,18 +152,18 @@ class Missions:
             link, (message.get_srcSystem(), message.get_srcComponent()), _ACCEPTED, message.mission_type
         )
 
-    def _on_set_current(self, link: Link, message: Any) -> None:
+    def _on_set_current(self, link: Line, message: Any) -> None:
         self._autopilot.firmware.plan.select(message.seq)
         self._autopilot.announce_current()
 
-    def _on_ack(self, link: Link, message: Any) -> None:
+    def _on_ack(self, link: Line, message: Any) -> None:
         """The other side ends its download, calls off an upload, or wants to be asked in the other form."""
         upload = self._upload
         if upload is None or upload.link is not link or message.mission_type != upload.kind:
             return
         if message.type == M.MAV_MISSION_OPERATION_CANCELLED:
             self._upload = None
-        elif message.type == M.MAV_MISSION_UNSUPPORTED and self._autopilot.firmware.plan_is_asked_int:
+        elif message.type == M.MAV_MISSION_UNSUPPORTED and self._autopilot.firmware.flavor.plan_is_asked_int:
             self._asks_int = not self._asks_int
             self._ask(upload)
 
@@ -176,10 +173,10 @@ class Missions:
         if upload is None:
             return
         now = self._autopilot.vehicle.time
-        if now - upload.heard_at > max(firmware.upload_timeout_s, firmware.link_floor_s):
+        if now - upload.heard_at > max(firmware.flavor.upload_timeout_s, firmware.link_floor_s):
             self._upload = None
             firmware.upload_timed_out()
-        elif now - upload.asked_at > max(firmware.upload_retry_s, firmware.link_floor_s):
+        elif now - upload.asked_at > max(firmware.flavor.upload_retry_s, firmware.link_floor_s):
             self._ask(upload)
 
 

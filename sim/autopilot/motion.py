@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from sim.autopilot.settings import STEP_S
 
 _DRAG_PER_M = 0.03  # acceleration per squared airspeed: 15 m/s of air cost all the tilt there is
+_INTO_M = 0.05  # so deep in a slope it has met the ground, even while it climbs
 _TILT_MPS2 = 6.9  # horizontal acceleration at 35 degrees of tilt
 
 
@@ -82,6 +83,7 @@ class Body:
         "_north_pull",
         "accel_up",
         "east",
+        "floor",
         "limits",
         "north",
         "on_ground",
@@ -95,7 +97,7 @@ class Body:
 
     def __init__(self, limits: Limits, yaw: float) -> None:
         self.limits = limits
-        self.north = self.east = self.up = 0.0
+        self.north = self.east = self.up = self.floor = 0.0  # floor: height of the ground below
         self.velocity_north = self.velocity_east = self.velocity_up = 0.0
         self.accel_up = self.yaw_rate = 0.0
         self.yaw, self.on_ground = yaw % 360.0, True
@@ -201,12 +203,12 @@ class Body:
         self.accel_up = self._climb_pull
         self.velocity_up += self.accel_up * STEP_S
         self.up += self.velocity_up * STEP_S
-        if self.up <= 0.0 and self.velocity_up <= 0.0:
-            self.up = 0.0
+        if self.up <= self.floor and (self.velocity_up <= 0.0 or self.up < self.floor - _INTO_M):
+            self.up = self.floor
             self.on_ground = True
             self.velocity_up = self._climb_pull = 0.0
             self._north_pull = self._east_pull = self._lean_north = self._lean_east = 0.0
-        elif self.up > 0.0:
+        elif self.up > self.floor:
             self.on_ground = False
 
     def _turn(self, yaw: float | None) -> None:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.autopilot.dialect import M
+from sim.autopilot.host import Host, Line
 from sim.autopilot.parameters import REAL32, Parameter, bits_to_whole, whole_to_bits
-
-if TYPE_CHECKING:
-    from sim.autopilot.core import Autopilot
-    from sim.autopilot.link import Link
 
 
 class ParameterProtocol:
     """Serves the parameters of the firmware."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(self, autopilot: Host) -> None:
         self._autopilot = autopilot
         self.handlers = {
             M.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._on_read,
@@ -24,10 +21,10 @@ class ParameterProtocol:
             M.MAVLINK_MSG_ID_PARAM_SET: self._on_set,
         }
 
-    def _send(self, link: Link, parameter: Parameter, index: int, kind: int | None = None) -> None:
+    def _send(self, link: Line, parameter: Parameter, index: int, kind: int | None = None) -> None:
         firmware = self._autopilot.firmware
         value = parameter.value
-        if parameter.kind != REAL32 and firmware.parameters_as_bits:
+        if parameter.kind != REAL32 and firmware.flavor.parameters_as_bits:
             value = whole_to_bits(int(value))
         name = parameter.name.encode("ascii")
         count = len(firmware.parameters)
@@ -35,7 +32,7 @@ class ParameterProtocol:
             M.MAVLink_param_value_message(name, value, parameter.kind if kind is None else kind, count, index)
         )
 
-    def _on_read(self, link: Link, message: Any) -> None:
+    def _on_read(self, link: Line, message: Any) -> None:
         firmware = self._autopilot.firmware
         store = firmware.parameters
         if message.param_index >= 0:
@@ -44,14 +41,14 @@ class ParameterProtocol:
             return
         index = store.index(_name(message.param_id))
         if index is not None:
-            self._send(link, store.at(index), index if firmware.tells_index_by_name else 65535)
+            self._send(link, store.at(index), index if firmware.flavor.tells_index_by_name else 65535)
 
-    def _on_list(self, link: Link, message: Any) -> None:
+    def _on_list(self, link: Line, message: Any) -> None:
         store = self._autopilot.firmware.parameters
         for index in range(len(store)):
             self._send(link, store.at(index), index)
 
-    def _on_set(self, link: Link, message: Any) -> None:
+    def _on_set(self, link: Line, message: Any) -> None:
         firmware = self._autopilot.firmware
         store = firmware.parameters
         name = _name(message.param_id)
@@ -60,15 +57,15 @@ class ParameterProtocol:
             return
         kind = store.at(index).kind
         value = message.param_value
-        as_bits = kind != REAL32 and firmware.parameters_as_bits
+        as_bits = kind != REAL32 and firmware.flavor.parameters_as_bits
         if not math.isfinite(value) and not as_bits:
             return
         if kind != REAL32:
             value = bits_to_whole(value) if as_bits else round(value)
         changed = store.set(name, value)
-        times = firmware.echoes_when_changed if changed else 1
+        times = firmware.flavor.echoes_when_changed if changed else 1
         for _ in range(times):
-            shown = index if firmware.tells_index_by_name else 65535
+            shown = index if firmware.flavor.tells_index_by_name else 65535
             self._send(link, store.at(index), shown, firmware.kind_after_set(kind))
 
 

@@ -36,6 +36,8 @@ PX4_PARAMETERS: list[Parameter] = [
     real("MPC_XY_VEL_MAX", 12.0),
     real("MPC_Z_VEL_MAX_DN", 1.5),
     real("MPC_Z_VEL_MAX_UP", 3.0),
+    real("MPC_Z_V_AUTO_DN", 1.5),
+    real("MPC_Z_V_AUTO_UP", 3.0),
     whole("NAV_DLL_ACT", 0),
     real("NAV_ACC_RAD", 10.0),
     whole("NAV_RCL_ACT", 2),

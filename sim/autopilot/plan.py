@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from sim.autopilot.behaviours import Behaviour, GoTo, Land, TakeOff
+from sim.autopilot.behaviours import GoTo, Land, TakeOff
 from sim.autopilot.dialect import M
 from sim.autopilot.motion import Demand
-from sim.autopilot.vehicle import Point, Vehicle
+from sim.autopilot.vehicle import Behaviour, Point, Vehicle
 
 _PASSED_M = 2.0
 

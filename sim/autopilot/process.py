@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Sequence
 from types import TracebackType
+from typing import ClassVar
 
 _START_S = 20.0
 _STOP_S = 10.0
@@ -20,6 +21,9 @@ class AutopilotProcess:
     `urls` are the addresses it has printed, in the order of `listen`, ports resolved. Raises RuntimeError
     when it ends before it listens.
     """
+
+    running: ClassVar[set[AutopilotProcess]] = set()
+    """All that were started and not stopped yet."""
 
     def __init__(
         self,
@@ -49,6 +53,7 @@ class AutopilotProcess:
 
     def __enter__(self) -> AutopilotProcess:
         self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE)
+        self.running.add(self)
         try:
             self._read_addresses(self._process)
         except BaseException:
@@ -95,6 +100,7 @@ class AutopilotProcess:
 
     def stop(self) -> int:
         """End it with SIGTERM and return its exit code."""
+        self.running.discard(self)
         process, self._process = self._process, None
         if process is None:
             return 0

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 from sim.autopilot.behaviours import (
-    Behaviour,
     FollowSetpoints,
     FollowSticks,
     GoTo,
@@ -14,27 +12,14 @@ from sim.autopilot.behaviours import (
     Return,
     TakeOff,
 )
-from sim.autopilot.commands import ACCEPTED, REJECTED, UNSUPPORTED, Command, Result, Results, whole
+from sim.autopilot.commands import ACCEPTED, REJECTED, UNSUPPORTED, ReceivedCommand, Results, whole
 from sim.autopilot.dialect import M
 from sim.autopilot.firmware import CRITICAL, FORCE, INFO, Firmware
-from sim.autopilot.motion import Limits
-from sim.autopilot.parameter_tables import PX4_PARAMETERS
-from sim.autopilot.parameters import Parameter
+from sim.autopilot.flavors import PX4, PX4_MAIN, px4_mode
 from sim.autopilot.plan import FlyPlan
-from sim.autopilot.vehicle import Point
+from sim.autopilot.vehicle import Behaviour, Point
 
-_MAIN = {"MANUAL": 1, "ALTCTL": 2, "POSCTL": 3, "AUTO": 4, "ACRO": 5, "OFFBOARD": 6, "STABILIZED": 7}
-_SUB = {"READY": 1, "TAKEOFF": 2, "LOITER": 3, "MISSION": 4, "RTL": 5, "LAND": 6, "FOLLOW": 8, "PRECLAND": 9}
-
-
-def _custom(main: int, sub: int = 0) -> int:
-    return main << 16 | sub << 24
-
-
-_MODES: dict[str, tuple[int, int]] = {f"AUTO_{name}": (29, _custom(4, sub)) for name, sub in _SUB.items()}
-_MODES |= {name: (81, _custom(main)) for name, main in _MAIN.items() if name not in ("AUTO", "OFFBOARD")}
-_MODES["OFFBOARD"] = (17, _custom(6))
-_MODE_OF = {custom: name for name, (_, custom) in _MODES.items()}
+_MODE_OF = {custom: name for name, (_, custom) in PX4.modes.items()}
 _STICK_MODES = ("MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED")
 _STICK_OVERRIDE = 0.3  # COM_RC_STICK_OV: deflection that takes the vehicle out of an automatic mode
 _NO_FAILSAFE = ("AUTO_RTL", "AUTO_LAND", "AUTO_TAKEOFF", "AUTO_PRECLAND")
@@ -43,57 +28,7 @@ _NO_FAILSAFE = ("AUTO_RTL", "AUTO_LAND", "AUTO_TAKEOFF", "AUTO_PRECLAND")
 class Px4(Firmware):
     """PX4 v1.16.0 as its SIH quadrotor answers on the ground station link."""
 
-    autopilot = M.MAV_AUTOPILOT_PX4
-    version = 1 << 24 | 16 << 16 | 255
-    capabilities = 59647 & ~M.MAV_PROTOCOL_CAPABILITY_FTP  # the recorded bits, without the file transfer
-    limits = Limits(
-        cruise=4.9,
-        accelerate=2.2,
-        brake=0.45,
-        jerk=5.2,
-        position_gain=2.2,
-        velocity_gain=1.15,
-        lag=0.45,
-        climb=2.9,
-        descend=1.5,
-        vertical_accelerate=2.5,
-        yaw_rate=60.0,
-    )
-    boot_mode, guided_mode, return_mode, land_mode = "AUTO_LOITER", "AUTO_LOITER", "AUTO_RTL", "AUTO_LAND"
-    heartbeat_modes = _MODES
-    default_streams_hz: ClassVar = {
-        M.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
-        M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
-        M.MAVLINK_MSG_ID_ATTITUDE: 50.0,
-        M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 10.0,
-        M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 10.0,
-        M.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
-        M.MAVLINK_MSG_ID_GPS_RAW_INT: 5.0,
-        M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0,
-        M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
-        M.MAVLINK_MSG_ID_VFR_HUD: 4.0,
-        M.MAVLINK_MSG_ID_ALTITUDE: 1.0,
-        M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 0.5,
-        M.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
-        M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 5.0,
-    }
-    unknown_request, unknown_interval = (Result.DENIED,), (Result.FAILED,)
-    requests_interval_message = False
-    heartbeat_on_mode_change = False
-    prearm_bit_everywhere = False
-    fence_frame = M.MAV_FRAME_GLOBAL_INT
-    plan_is_asked_int = True
-    refuses_wrong_seq = False
-    upload_retry_s, upload_timeout_s = 0.25, 5.0
-    parameters_as_bits, tells_index_by_name, echoes_when_changed = True, True, 2
-    serves_data_streams = False
-    reboot_refusal, pilot_mode = REJECTED, "POSCTL"
-    target_fields = (M.MAV_FRAME_GLOBAL_INT, 0, True)
-    cells = 4
-    critical_battery = ("COM_LOW_BAT_ACT", {"warn": 0.0, "land": 2.0, "return": 3.0})
-    position_error_m, velocity_error_mps = 0.45, 0.06
-    landing_takes_s, disarm_after_landing_s = 1.0, 2.0
-    home_share = 0.2
+    flavor = PX4
 
     def boot(self) -> None:
         self._setpoint_at = -1e9
@@ -110,9 +45,6 @@ class Px4(Firmware):
 
     def upload_timed_out(self) -> None:
         self.vehicle.say(CRITICAL, "Operation timeout")
-
-    def parameter_table(self) -> list[Parameter]:
-        return PX4_PARAMETERS
 
     def hears(self, system: int, component: int) -> bool:
         return system == self.settings.sysid and component in (0, 1)
@@ -171,11 +103,13 @@ class Px4(Firmware):
             return
         super().set_mode(mode, behaviour)
 
-    def on_set_mode(self, command: Command) -> Results:
+    def on_set_mode(self, command: ReceivedCommand) -> Results:
         if not whole(command.param1) & M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return ACCEPTED + REJECTED
         main = whole(command.param2)
-        return ACCEPTED + self._enter(_custom(main, whole(command.param3) if main == _MAIN["AUTO"] else 0))
+        return ACCEPTED + self._enter(
+            px4_mode(main, whole(command.param3) if main == PX4_MAIN["AUTO"] else 0)
+        )
 
     def on_set_mode_message(self, custom_mode: int) -> Results:
         return self._enter(custom_mode)
@@ -199,7 +133,7 @@ class Px4(Firmware):
         return ACCEPTED
 
     # ---- commands
-    def on_arm(self, command: Command) -> Results:
+    def on_arm(self, command: ReceivedCommand) -> Results:
         vehicle = self.vehicle
         force = command.param2 == FORCE
         if command.param1 == 0.0:
@@ -210,13 +144,14 @@ class Px4(Firmware):
             return ACCEPTED
         if vehicle.armed:
             return ACCEPTED
-        if not self.ready and not force:
-            vehicle.say(CRITICAL, "Arming denied: Resolve system health failures first")
+        refusal = self.arming_refusal or (None if self.ready else self.flavor.not_ready_text)
+        if refusal is not None and not force:
+            vehicle.say(CRITICAL, f"Arming denied: {refusal}")
             return REJECTED
         self.arm("Armed by external command")
         return ACCEPTED
 
-    def on_takeoff(self, command: Command) -> Results:
+    def on_takeoff(self, command: ReceivedCommand) -> Results:
         vehicle = self.vehicle
         height = self.parameters["MIS_TAKEOFF_ALT"] + vehicle.seen.up
         up = command.z - vehicle.ground_amsl if math.isfinite(command.z) else height
@@ -228,15 +163,15 @@ class Px4(Firmware):
         self.set_mode("AUTO_TAKEOFF", self.behaviour_of("AUTO_TAKEOFF"))
         return ACCEPTED
 
-    def on_land(self, command: Command) -> Results:
+    def on_land(self, command: ReceivedCommand) -> Results:
         self.vehicle.say(INFO, "Landing at current position")
         return super().on_land(command)
 
-    def on_return(self, command: Command) -> Results:
+    def on_return(self, command: ReceivedCommand) -> Results:
         self.vehicle.say(INFO, "Returning to launch")
         return super().on_return(command)
 
-    def on_reposition(self, command: Command) -> Results:
+    def on_reposition(self, command: ReceivedCommand) -> Results:
         flags = whole(command.param2)
         plain = flags == 1
         if not plain and self.mode != "AUTO_LOITER":
@@ -253,7 +188,11 @@ class Px4(Firmware):
         north, east = (here.north, here.east) if here is not None else place or (0.0, 0.0)
         yaw = math.degrees(command.param4) % 360.0 if math.isfinite(command.param4) else None
         speed = command.param1 if command.param1 > 0 else None
-        leg = GoTo(Point(north, east, self.up_of_amsl(command.z)), yaw=yaw, speed=speed, straight=True)
+        leg: Behaviour = GoTo(
+            Point(north, east, self.up_of_amsl(command.z)), yaw=yaw, speed=speed, straight=True
+        )
+        if place is None and yaw is None and not math.isfinite(command.z):
+            leg = self.behaviour_of("AUTO_LOITER")  # nowhere: it pauses where it can stop
         self.failsafe = False
         if vehicle.flying:
             if not vehicle.stuck:
@@ -262,17 +201,17 @@ class Px4(Firmware):
             self.set_mode("AUTO_LOITER")
         return result
 
-    def on_change_speed(self, command: Command) -> Results:
+    def on_change_speed(self, command: ReceivedCommand) -> Results:
         if command.param2 > 0:
             self.vehicle.speed_limit = min(command.param2, 12.0)
         elif command.param2 < -1.5:
             self.vehicle.speed_limit = None
         return ACCEPTED
 
-    def on_mission_start(self, command: Command) -> Results:
+    def on_mission_start(self, command: ReceivedCommand) -> Results:
         if not self.plan.mission:
             return REJECTED
-        return self._enter(_MODES["AUTO_MISSION"][1])
+        return self._enter(PX4.modes["AUTO_MISSION"][1])
 
     def on_setpoint(
         self, position: Point | None, velocity: tuple[float, float, float] | None, yaw: float | None

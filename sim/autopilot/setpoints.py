@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sim.autopilot.dialect import M
+from sim.autopilot.host import Host, Line
 from sim.autopilot.vehicle import Point
-
-if TYPE_CHECKING:
-    from sim.autopilot.core import Autopilot
-    from sim.autopilot.link import Link
 
 _NO_POSITION, _NO_VELOCITY, _NO_YAW = 0x0007, 0x0038, 0x0400
 _ABSOLUTE = (M.MAV_FRAME_GLOBAL, M.MAV_FRAME_GLOBAL_INT)
@@ -20,14 +17,14 @@ _BODY = (M.MAV_FRAME_BODY_NED, M.MAV_FRAME_BODY_OFFSET_NED)
 class Setpoints:
     """Hands setpoints to the firmware, which decides whether it follows."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(self, autopilot: Host) -> None:
         self._autopilot = autopilot
         self.handlers = {
             M.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._on_global,
             M.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self._on_local,
         }
 
-    def _on_global(self, link: Link, message: Any) -> None:
+    def _on_global(self, link: Line, message: Any) -> None:
         firmware = self._autopilot.firmware
         position = None
         if not message.type_mask & _NO_POSITION:
@@ -39,10 +36,11 @@ class Setpoints:
             position = Point(north, east, up)
         self._hand_on(message, position)
 
-    def _on_local(self, link: Link, message: Any) -> None:
+    def _on_local(self, link: Line, message: Any) -> None:
         position = None
         if not message.type_mask & _NO_POSITION:
-            position = Point(message.x, message.y, -message.z)
+            origin = self._autopilot.vehicle.origin
+            position = Point(message.x + origin.north, message.y + origin.east, -message.z + origin.up)
         self._hand_on(message, position)
 
     def _hand_on(self, message: Any, position: Point | None) -> None:

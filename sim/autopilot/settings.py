@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from sim.autopilot.ground import Flat, Ground
 
 STEP_S = 0.02  # vehicle time of one step of the physics, whatever the speed-up
 
@@ -21,4 +23,7 @@ class Settings:
     endurance_s: float = 35.0 * 60.0  # hovering, from full to empty
     wind_mps: tuple[float, float] = (0.0, 0.0)  # air moves towards north, east
     gust_mps: float = 0.0  # standard deviation of the gusts on top
+    ground: Ground = field(default_factory=Flat)
+    rangefinder: bool = False  # a lidar that looks down
+    swap_battery_s: float | None = None  # disarmed for so long it gets a full one, which starts it again
     epoch_s: float = 1_800_000_000.0  # time of day at boot, seconds since 1970

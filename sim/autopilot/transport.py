@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 from sim.autopilot.address import Address
 from sim.autopilot.core import Autopilot
 from sim.autopilot.firmware import link_floor_s
+from sim.autopilot.lockstep import Lockstep
 from sim.autopilot.settings import STEP_S
 
 _BEHIND_S = 0.25  # wall time a stalled machine may be behind before the vehicle's clock waits for it
@@ -42,25 +43,37 @@ class Carrier:
             carrier.flush()
 
 
+def _carry(autopilots: Sequence[Autopilot], send: Callable[[list[bytes]], None]) -> list[Carrier]:
+    """A link to each of the autopilots, all through one socket: what comes in reaches every one."""
+    carriers = [Carrier(autopilot, send) for autopilot in autopilots]
+    for carrier in carriers:
+        carrier.autopilot.carriers.append(carrier)
+    return carriers
+
+
+def _drop(carriers: Sequence[Carrier]) -> None:
+    for carrier in carriers:
+        carrier.autopilot.carriers.remove(carrier)
+        carrier.autopilot.remove_link(carrier.link)
+
+
 class _Udp(asyncio.DatagramProtocol):
     """A UDP socket; every peer that speaks to it is a link of its own."""
 
-    def __init__(self, autopilot: Autopilot, peer: tuple[str, int] | None) -> None:
-        self._autopilot, self._fixed = autopilot, peer
-        self._peers: dict[Any, Carrier] = {}
+    def __init__(self, autopilots: Sequence[Autopilot], peer: tuple[str, int] | None) -> None:
+        self._autopilots, self._fixed = autopilots, peer
+        self._peers: dict[Any, list[Carrier]] = {}
         self._transport: asyncio.DatagramTransport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.DatagramTransport, transport)
         if self._fixed is not None:
-            self._carrier(self._fixed)
+            self._carriers(self._fixed)
 
-    def _carrier(self, peer: Any) -> Carrier:
-        carrier = self._peers.get(peer)
-        if carrier is None:
-            carrier = self._peers[peer] = Carrier(self._autopilot, lambda frames: self._send(frames, peer))
-            self._autopilot.carriers.append(carrier)
-        return carrier
+    def _carriers(self, peer: Any) -> list[Carrier]:
+        if peer not in self._peers:
+            self._peers[peer] = _carry(self._autopilots, lambda frames: self._send(frames, peer))
+        return self._peers[peer]
 
     def _send(self, frames: list[bytes], peer: Any) -> None:
         if self._transport is not None:
@@ -68,7 +81,8 @@ class _Udp(asyncio.DatagramProtocol):
                 self._transport.sendto(frame, peer)
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
-        self._carrier(addr).receive(data)
+        for carrier in self._carriers(addr):
+            carrier.receive(data)
 
     def error_received(self, exc: Exception) -> None:
         """Nobody listens there (yet): what a radio would not even notice."""
@@ -76,46 +90,42 @@ class _Udp(asyncio.DatagramProtocol):
     def forget(self) -> None:
         """Drop the peers that have gone silent."""
         long_ago = time.monotonic() - _FORGET_S
-        for peer, carrier in tuple(self._peers.items()):
-            if carrier.heard_at < long_ago and peer != self._fixed:
+        for peer, carriers in tuple(self._peers.items()):
+            if carriers[0].heard_at < long_ago and peer != self._fixed:
                 del self._peers[peer]
-                self._autopilot.carriers.remove(carrier)
-                self._autopilot.remove_link(carrier.link)
+                _drop(carriers)
 
 
 class _Tcp(asyncio.Protocol):
     """One client of a TCP server."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self._autopilot = autopilot
-        self._carrier: Carrier | None = None
+    def __init__(self, autopilots: Sequence[Autopilot]) -> None:
+        self._autopilots = autopilots
+        self._carriers: list[Carrier] = []
         self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
-        self._carrier = Carrier(self._autopilot, self._send)
-        self._autopilot.carriers.append(self._carrier)
+        self._carriers = _carry(self._autopilots, self._send)
 
     def _send(self, frames: list[bytes]) -> None:
         if self._transport is not None and self._transport.get_write_buffer_size() < _BACKLOG:
             self._transport.write(b"".join(frames))
 
     def data_received(self, data: bytes) -> None:
-        if self._carrier is not None:
-            self._carrier.receive(data)
+        for carrier in self._carriers:
+            carrier.receive(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        if self._carrier is not None:
-            self._autopilot.carriers.remove(self._carrier)
-            self._autopilot.remove_link(self._carrier.link)
-            self._carrier = self._transport = None
+        _drop(self._carriers)
+        self._carriers, self._transport = [], None
 
 
 class Mock:
-    """An autopilot with its sockets. `addresses` are the bound ones, ports resolved."""
+    """An autopilot, or several that share a radio, with its sockets. `addresses` are the bound ones, ports resolved."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self.autopilot = autopilot
+    def __init__(self, autopilot: Autopilot, *others: Autopilot) -> None:
+        self.autopilot, self.autopilots = autopilot, (autopilot, *others)
         self.addresses: list[Address] = []
         self._udp: list[_Udp] = []
         self._closers: list[Callable[[], None]] = []
@@ -124,13 +134,13 @@ class Mock:
         """Open one address and return it with its port resolved; OSError if it cannot be had."""
         loop = asyncio.get_running_loop()
         if address.kind == "tcpin":
-            server = await loop.create_server(lambda: _Tcp(self.autopilot), address.host, address.port)
+            server = await loop.create_server(lambda: _Tcp(self.autopilots), address.host, address.port)
             self._closers.append(server.close)
             host, port = server.sockets[0].getsockname()[:2]
         else:
             out = address.kind == "udpout"
             transport, protocol = await loop.create_datagram_endpoint(
-                lambda: _Udp(self.autopilot, (address.host, address.port) if out else None),
+                lambda: _Udp(self.autopilots, (address.host, address.port) if out else None),
                 local_addr=("0.0.0.0" if not _is_loopback(address.host) else "127.0.0.1", 0)
                 if out
                 else (address.host, address.port),
@@ -144,8 +154,9 @@ class Mock:
 
     def flush(self) -> None:
         """Send what the vehicle has said since."""
-        for carrier in tuple(self.autopilot.carriers):
-            carrier.flush()
+        for autopilot in self.autopilots:
+            for carrier in tuple(autopilot.carriers):
+                carrier.flush()
 
     def forget(self) -> None:
         """Drop silent UDP peers."""
@@ -167,18 +178,19 @@ class Driver:
     """Runs the clocks of all mocks of a process, `speedup` times as fast as the wall.
 
     The vehicles move in steps of the same length whatever the speed-up is. When the machine cannot keep up,
-    vehicle time runs slower; it never jumps.
+    vehicle time runs slower; it never jumps. In `lockstep` it also waits for who flies with them.
     """
 
-    def __init__(self, mocks: list[Mock], speedup: float) -> None:
-        self._mocks = mocks
+    def __init__(self, mocks: list[Mock], speedup: float, lockstep: Lockstep | None = None) -> None:
+        self._mocks, self._lockstep = mocks, lockstep
         self.set_speedup(speedup)
 
     def set_speedup(self, speedup: float) -> None:
         """Run so many times faster than the wall clock from now on."""
         self._speedup = speedup
         for mock in self._mocks:
-            mock.autopilot.firmware.link_floor_s = link_floor_s(speedup)
+            for autopilot in mock.autopilots:
+                autopilot.firmware.link_floor_s = link_floor_s(speedup)
 
     async def run(self) -> None:
         """Run until cancelled."""
@@ -190,11 +202,14 @@ class Driver:
             owed = min(owed + (now - last) * self._speedup, _BEHIND_S * self._speedup)
             last = now
             steps = int(owed / STEP_S)
+            if self._lockstep is not None:
+                steps = self._lockstep.steps(steps, self._speedup)
             if steps == 0:
                 continue
-            owed -= steps * STEP_S
+            owed = max(0.0, owed - steps * STEP_S)
             for mock in self._mocks:
-                mock.autopilot.advance(steps)
+                for autopilot in mock.autopilots:
+                    autopilot.advance(steps)
                 mock.flush()
             if now - swept > 10.0:
                 swept = now

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from sim.autopilot.dialect import M
 
 _ACK = int(M.MAVLINK_MSG_ID_COMMAND_ACK)
+_MAVLINK1 = 0xFE
 _REORDER_S = 0.15  # how late a piece comes that is overtaken
 
 
@@ -27,6 +28,8 @@ class Trouble:
     delay_s: float = 0.0
     corrupt: float = 0.0
     acks_lost: bool = False
+    deaf: bool = False  # nothing reaches the vehicle
+    mute: bool = False  # nothing it says is carried
 
     @property
     def any(self) -> bool:
@@ -79,5 +82,7 @@ class Radio:
 
 
 def is_ack(frame: bytes) -> bool:
-    """Is a MAVLink 2 frame a COMMAND_ACK?"""
+    """Is a frame, of either version, a COMMAND_ACK?"""
+    if frame[0] == _MAVLINK1:
+        return frame[5] == _ACK
     return len(frame) > 10 and int.from_bytes(frame[7:10], "little") == _ACK

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections import deque
 from enum import IntEnum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from sim.autopilot.battery import Battery
 from sim.autopilot.geo import LocalFrame
@@ -13,9 +14,8 @@ from sim.autopilot.motion import Body, Demand, Limits
 from sim.autopilot.sensors import PERIOD_S, Estimator, GpsReceiver, Wind
 from sim.autopilot.settings import STEP_S, Settings
 
-if TYPE_CHECKING:
-    from sim.autopilot.behaviours import Behaviour
-
+_BESIDE_HOME_M = 15.0  # nearer to where it started it takes off and lands
+_HARD_MPS = 3.0  # meeting the ground faster than this, along or down, is a crash
 _PERIOD_STEPS = round(PERIOD_S / STEP_S)
 
 
@@ -66,6 +66,14 @@ class Vehicle:
         self.random = source
         self.steps = 0
         self.home: Point | None = None
+        self.origin = Point(0.0, 0.0, 0.0)  # of the estimator, in the home frame
+        self.ground, self.crashed = settings.ground, False  # crashed: it has met the ground too fast
+        self.least_clearance = math.inf  # nearest to the ground while it flew, away from where it started
+        # metres by which a distance sensor sees the ground below higher than it is; None: there is no sensor
+        self.rangefinder_rise = 0.0 if settings.rangefinder else None
+        # the same for what it has of the ground in its own database; None: it has nothing
+        self.terrain_rise = 0.0 if settings.rangefinder else None
+        self.tells_wind = False  # a stock multicopter does not know the wind
         self.armed, self.armed_at, self.touched_at = False, 0.0, 0.0
         self.flew = False  # has left the ground since it was armed
         self.landed = Landed.ON_GROUND
@@ -113,20 +121,25 @@ class Vehicle:
         if not self.armed and body.on_ground:
             return
         demand = self._demand
-        if not self.armed:  # motors stopped in the air: it falls
+        body.floor = self.ground.height(body.north, body.east)
+        speed, sink = body.speed, -body.velocity_up
+        was_on_ground = body.on_ground
+        if not was_on_ground and math.hypot(body.north, body.east) > _BESIDE_HOME_M:
+            self.least_clearance = min(self.least_clearance, body.up - body.floor)
+        if self.armed:
+            self.behaviour.steer(self, demand)
+            error = self.estimator
+            seen = (body.north + error.north, body.east + error.east, body.up + error.up)
+            body.step(demand, seen, self.air, self.behaviour.lifts)
+        else:  # motors stopped in the air: it falls
             demand.north, demand.velocity_north, demand.velocity_east = None, 0.0, 0.0
             demand.up, demand.velocity_up, demand.descend, demand.yaw = None, -9.0, 9.0, None
             body.step(demand, (body.north, body.east, body.up), self.air, False)
-            return
-        self.behaviour.steer(self, demand)
-        error = self.estimator
-        seen = (body.north + error.north, body.east + error.east, body.up + error.up)
-        was_on_ground = body.on_ground
-        body.step(demand, seen, self.air, self.behaviour.lifts)
         if was_on_ground and not body.on_ground:
             self.flew = True
         elif body.on_ground and not was_on_ground:
             self.touched_at = self.time
+            self.crashed = self.crashed or speed > _HARD_MPS or sink > _HARD_MPS
 
     def _slow(self) -> None:
         """What changes slowly enough for ten times a second."""
@@ -135,3 +148,20 @@ class Vehicle:
         self.air = self.wind.draw()
         body = self.body
         self.battery.draw(PERIOD_S, flying=self.flying, speed=body.speed, climb=body.velocity_up)
+
+
+class Behaviour:
+    """One thing a vehicle does."""
+
+    lifts = False  # may leave the ground
+    landed: Landed = Landed.IN_AIR  # the landed state reported while it is in the air doing this
+    done = False
+
+    def steer(self, vehicle: Vehicle, demand: Demand) -> None:
+        """Write what the body should do in this step."""
+        raise NotImplementedError
+
+    @property
+    def target(self) -> Point | None:
+        """Where it is going, if that can be said."""
+        return None

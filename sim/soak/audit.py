@@ -7,16 +7,22 @@ import math
 import sqlite3
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from roisearch import Belief
+from service import timebase
 from service.area import build_grid, read_area  # the search starts from the prior that the service lays
+from service.entries import UnknownRow, read_entries
+from service.errors import BadInput
 from sim.soak import ground
 
-_MAY_STOP = {"HOLDING", "FOUND", "CONFIRMING"}  # the last for another look at a suspect
+_MAY_STOP = {"HOLDING", "FOUND", "CONFIRMING", "SEARCHING"}
+"""CONFIRMING for another look at a suspect, SEARCHING where the ground forbids a leg by now: it is planned anew."""
+_READ_ELSEWHERE = {timebase.ROW}  # how the clocks stood
 _MOST_STOPS = 4  # in a hold: the one at its beginning, and again when one may have been lost
 _MAY_MOVE = {"TAKEOFF", "SEARCHING", "CONFIRMING", "RETURNING"}
 Told = tuple[int, str]
@@ -43,15 +49,44 @@ def rows_of(journal: Path) -> list[Row]:
         database.close()
 
 
-def audit(folder: Path, acknowledged: set[str], told: Iterable[Told]) -> list[str]:
+@dataclass(frozen=True)
+class Target:
+    """Where the target is, and the ids of the reports that saw it."""
+
+    place: ground.LatLon
+    seen_in: frozenset[str]
+
+
+def audit(
+    folder: Path, acknowledged: set[str], told: Iterable[Told], target: Target | None = None
+) -> list[str]:
     """What is wrong with the journal of a run's folder, as sentences.
 
     Args:
         acknowledged: the ids of reports that the door has accepted.
         told: what the door has told of its belief.
+        target: of the flight, if it had one.
     """
     rows = rows_of(folder / "journal.sqlite")
-    return [*_numbered(rows), *_complete(rows, acknowledged), *_moves(rows), *_adds_up(folder, rows, told)]
+    return [
+        *_readable(folder / "journal.sqlite"),
+        *_numbered(rows),
+        *_complete(rows, acknowledged),
+        *(wrong for name in _aircraft(rows) for wrong in _moves([row for row in rows if _of(row) == name])),
+        *_adds_up(folder, rows, told),
+        *_believes_the_true(folder, rows, target),
+    ]
+
+
+def _readable(journal: Path) -> list[str]:
+    """The one judgement that is the service's own: whether it can go on from what it has written."""
+    try:
+        for entry in read_entries(journal):
+            if isinstance(entry.said, UnknownRow) and entry.said.kind not in _READ_ELSEWHERE:
+                return [f"row {entry.seq} is of a kind that nobody reads: {entry.said.kind}"]
+    except BadInput as error:
+        return [str(error)]
+    return []
 
 
 def _numbered(rows: list[Row]) -> list[str]:
@@ -70,11 +105,26 @@ def _complete(rows: list[Row], acknowledged: set[str]) -> list[str]:
     return found
 
 
+def _of(row: Row) -> str:
+    """The name of the aircraft that a row is of; empty: of the only one, or of none."""
+    return str(row.body.get("aircraft", ""))
+
+
+def _aircraft(rows: list[Row]) -> list[str]:
+    """All names that there are."""
+    return sorted({_of(row) for row in rows})
+
+
 def _moves(rows: list[Row]) -> list[str]:
-    """No waypoint but in a state that may move, few stops in a hold, and no gap in the states."""
+    """Of one aircraft's rows: waypoints only in states that may move, few stops in a hold, no gap in the states."""
     found = []
     state, stops = "WAITING", 0
+    given_up = {
+        last.seq for last, row in pairwise(rows) if row.kind == "transition" and row.body["to"] == "ABORTED"
+    }
     for row in rows:
+        if row.kind == "command" and row.seq in given_up:
+            continue  # what stops the aircraft goes out before the end is written down
         if row.kind == "transition":
             before = row.body["from"]
             if before not in (state, "WAITING"):  # a process that goes on with the run starts from there
@@ -82,7 +132,7 @@ def _moves(rows: list[Row]) -> list[str]:
             state, stops = row.body["to"], 0
         elif row.kind == "command":
             command = row.body["command"]
-            stops += command == "hold"
+            stops = 0 if command == "reposition" else stops + (command == "hold")
             if command == "hold" and (
                 state not in _MAY_STOP or (stops > _MOST_STOPS and state != "CONFIRMING")
             ):
@@ -92,6 +142,36 @@ def _moves(rows: list[Row]) -> list[str]:
     return found
 
 
+def _believes_the_true(folder: Path, rows: list[Row], target: Target | None) -> list[str]:
+    """A report that saw the target never lowers what is believed of the target's own cell."""
+    if target is None:
+        return []
+    grid = build_grid(read_area(folder / "area.geojson"), ground.CELL_M)
+    belief = Belief(grid.prior, searchable=grid.searchable, outside=grid.outside)
+    cells, inside = grid.frame.locate([target.place])
+    if not inside[0]:
+        return []
+    found = []
+    for row in rows:
+        if row.kind != "report" or (seen := row.body["observation"]) is None:
+            continue
+        before = float(belief.mass_at(cells)[0])
+        _observe(belief, seen)
+        after, name = float(belief.mass_at(cells)[0]), row.body["report"]["id"]
+        if name in target.seen_in and after < before * (1.0 - 1e-9):
+            found.append(
+                f"row {row.seq}: report {name} saw the target, and lowered its cell from {before:.3%} to {after:.3%}"
+            )
+    return found[:3]
+
+
+def _observe(belief: Belief, seen: dict[str, Any]) -> None:
+    cells = np.array(seen["cells"], dtype=np.int64).reshape(-1, 2)
+    belief.observe(
+        cells, np.array(seen["hits"], dtype=np.bool_), np.array(seen["p_tp"]), np.array(seen["p_tn"])
+    )
+
+
 def _adds_up(folder: Path, rows: list[Row], told: Iterable[Told]) -> list[str]:
     grid = build_grid(read_area(folder / "area.geojson"), ground.CELL_M)
     belief = Belief(grid.prior, searchable=grid.searchable, outside=grid.outside)
@@ -99,9 +179,7 @@ def _adds_up(folder: Path, rows: list[Row], told: Iterable[Told]) -> list[str]:
     for row in rows:
         if row.kind == "report":
             if (seen := row.body["observation"]) is not None:
-                cells = np.array(seen["cells"], dtype=np.int64).reshape(-1, 2)
-                hits = np.array(seen["hits"], dtype=np.bool_)
-                belief.observe(cells, hits, np.array(seen["p_tp"]), np.array(seen["p_tn"]))
+                _observe(belief, seen)
             digests.append(belief.digest())
     found = []
     for count, digest in told:

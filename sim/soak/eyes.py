@@ -6,14 +6,17 @@ import math
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
 
-from sim.detector import Detector
+from sim.detector import Detector, of_aircraft
 from sim.soak.audit import Told
 
 _LOOK_S = 0.2
+_GROWTH_MB, _GROWTH_PART = 40.0, 0.25
+_MOST_TASKS = 60
 _BAD = (
     (b"{", "application/json"),
     (b'{"id": "x", "captured_at": NaN}', "application/json"),
@@ -22,15 +25,37 @@ _BAD = (
 )
 
 
+def misplaced(way: str, seen: dict[str, Any]) -> dict[str, float]:
+    """Where a detector that lies in some way says that it saw something."""
+    places = {
+        "swapped": (seen["lon"], seen["lat"]),
+        "nowhere": (0.0, 0.0),
+        "far": (seen["lat"] + 0.009, seen["lon"]),
+    }
+    lat, lon = places.get(way, (seen["lat"], seen["lon"]))
+    return {"lat": lat, "lon": lon}
+
+
 class Eyes:
     """Two threads beside one service; `violations` are sentences.
 
-    `silent`, `repeats` and `rude` are switches of the detector: it says nothing, says everything twice, or sends what
-    is no report in between.
+    Attributes:
+        silent, repeats, rude: switches of the detector: it says nothing, says everything twice, or sends what is no
+            report in between.
+        lies: how it places what it sees: "swapped" (latitude for longitude), "nowhere" (0/0), "far" (a kilometre off).
+        clock_off_s: how far the computer's clock has been stepped since the service began. `own_clock`: the detector
+            goes by that, and otherwise by the service's: a flight faster than the wall clock knows no other.
+        aircraft: whose camera it is; empty: of the only one.
+        true_hits: the ids of reports in which it saw the target, wherever it said it was.
     """
 
-    def __init__(self, url: str, pid: int, detector: Detector, rate_hz: float) -> None:
+    def __init__(
+        self, url: str, pid: int, detector: Detector, rate_hz: float, *, own_clock: bool = False
+    ) -> None:
         self.silent = self.repeats = self.rude = False
+        self.lies = self.aircraft = ""
+        self.clock_off_s, self._own_clock = 0.0, own_clock
+        self.true_hits: set[str] = set()
         self.acknowledged: set[str] = set()
         self.told: list[Told] = []
         self.violations: list[str] = []
@@ -67,10 +92,21 @@ class Eyes:
 
     def _frame(self, door: httpx.Client, last: object) -> object:
         state = door.get("/api/state").raise_for_status().json()
+        state = of_aircraft(state, self.aircraft)
         pose = state["pose"]
         if pose is None or pose["time"] == last:
             return last
         frame = self._detector.frame(state)
+        if self.aircraft:
+            frame["aircraft"] = self.aircraft
+        target = self._detector.target_at(pose["time"])
+        if any((seen["lat"], seen["lon"]) == target for seen in frame["detections"]):
+            self.true_hits.add(frame["id"])
+        if self._own_clock:
+            del frame["clock"]
+            frame["captured_at"] += self.clock_off_s
+        for seen in frame["detections"]:
+            seen.update(misplaced(self.lies, seen))
         for _ in range(2 if self.repeats else 1):
             for receipt in door.post("/api/reports", json=frame).raise_for_status().json():
                 if receipt["status"] == "accepted":
@@ -108,3 +144,22 @@ class Eyes:
         status = Path(f"/proc/{self._pid}/status").read_text(encoding="ascii")
         if resident := status.partition("VmRSS:")[2].split():  # a process that is ending has none
             self.memory_mb.append(int(resident[0]) / 1024.0)
+
+
+def grown(eyes: Eyes) -> list[str]:
+    """Whether memory or tasks have grown from the middle of a process's life to its end."""
+    found = []
+    third = len(eyes.memory_mb) // 3
+    if third >= 10:
+        middle, end = (
+            float(np.median(part)) for part in (eyes.memory_mb[third:-third], eyes.memory_mb[-third:])
+        )
+        if end - middle > max(_GROWTH_MB, _GROWTH_PART * middle):
+            found.append(f"memory has grown from {middle:.0f} to {end:.0f} MB")
+    if eyes.memory_mb and not max(eyes.tasks, default=0):
+        found.append("the number of tasks is not told")
+    if max(eyes.tasks, default=0) > _MOST_TASKS * (2 if eyes.aircraft else 1):
+        found.append(f"{max(eyes.tasks)} tasks at a time")
+    if third >= 10 and eyes.tasks and min(eyes.tasks[-third:]) > max(eyes.tasks[third:-third]):
+        found.append(f"tasks have grown from {max(eyes.tasks[third:-third])} to {min(eyes.tasks[-third:])}")
+    return found

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
@@ -20,13 +21,17 @@ import numpy as np
 from sim.autopilot.control import Control
 from sim.autopilot.process import AutopilotProcess
 from sim.detector import Detector
-from sim.soak import ground
-from sim.soak.audit import audit
-from sim.soak.eyes import Eyes
-from sim.soak.judge import Judge
+from sim.grounds import write_heights
+from sim.soak import clocked, ground
+from sim.soak.audit import Target, audit
+from sim.soak.clocked import SteppedClock
+from sim.soak.eyes import Eyes, grown
+from sim.soak.judge import AFTER, OPERATOR, Judge
+from sim.soak.kinds import AT_BOOT, GROUNDS, KINDS
 from sim.soak.plan import Fault, Plan
 from sim.soak.process import Process
 from sim.soak.tap import Tap
+from sim.soak.wing import Wing
 
 _FINAL = {"DONE", "ABORTED"}
 _FLYING = {"SEARCHING", "CONFIRMING"}
@@ -34,11 +39,12 @@ _PATIENCE_S = 90.0  # wall time: what takes longer never ends
 _COMPILED_S = 400.0  # the first flight on a machine compiles the planner
 _HELP_AFTER_S = 8.0  # vehicle time after which the operator resumes a search that does not go on by itself
 _BAD_WORDS = ("Traceback", "never retrieved", "was destroyed", "never awaited", "Unhandled", "Exception in")
-_GROWTH_MB, _GROWTH_PART = 40.0, 0.25
-_MOST_TASKS = 60
 SETTINGS = f"""
+[run]
+next_sortie_within_s = 0
 [flight]
 altitude_m = {ground.HEIGHT_M:g}
+clearance_m = {ground.CLEARANCE_M:g}
 max_hold_s = 120
 [sensor]
 cell_m = {ground.CELL_M:g}
@@ -59,24 +65,28 @@ class Outcome:
     plan: Plan
     ended: str = ""
     steps: int = 0
+    seconds: float = 0.0  # of the vehicle's clock
     reports: int = 0
+    true_hits: int = 0
     beliefs: int = 0
     motions: Counter[str] = field(default_factory=Counter)
     faults: Counter[str] = field(default_factory=Counter)
+    together: int = 0  # moments at which two were in the air, and judged
     violations: list[str] = field(default_factory=list)
     said: str = ""
 
 
-class Flight:
+class SoakFlight:
     """Flies one plan in a folder of its own."""
 
     def __init__(self, plan: Plan, folder: Path, speedup: float) -> None:
         self.plan, self.folder, self.speedup = plan, folder, speedup
         self.outcome = Outcome(plan)
-        self.judge = Judge(plan.flavor, speedup)
+        self.judge = Judge(plan.flavor, speedup, hill=plan.hill)
         self._detector = Detector(plan.target, 0.9, 0.97, plan.seed)
         self._rng = np.random.default_rng(plan.seed)
         self._finished: list[Eyes] = []
+        self._wing: Wing | None = None
 
     def fly(self) -> Outcome:
         """Fly it; every violation is in the outcome, even that it could not be flown."""
@@ -85,7 +95,8 @@ class Flight:
                 self._start(stack)
                 self._play()
             except (Trouble, AssertionError) as trouble:
-                self.outcome.violations.append(str(trouble).partition("\n")[0])
+                after = AFTER.format(self.judge.during or self.plan.at_boot)
+                self.outcome.violations.append(str(trouble).partition("\n")[0] + after)
             finally:
                 self._look_away()
                 if hasattr(self, "_service"):
@@ -96,32 +107,66 @@ class Flight:
     # ---- setting up
 
     def _start(self, stack: ExitStack) -> None:
+        self.folder.mkdir(parents=True)
+        self._clock = SteppedClock(self.folder / "clock")
         lat, lon = ground.launch()
         home = f"--home={lat:.7f},{lon:.7f},{ground.GROUND_AMSL_M:g}"
         options = [home, "--ready-after", "3", "--control", "127.0.0.1:0", "--seed", str(self.plan.seed)]
-        options += ["--endurance", "600"]
+        options += ["--endurance", f"{ground.ENDURANCE_S / 60.0:g}"]
+        options += self._odd_from_the_start()
+        over: list[str] = []
+        if self.plan.hill:
+            dem = self.folder / "hill.tif"
+            write_heights(ground.HILL, dem)
+            over = ["--ground", str(dem)]
+        options += over
         mock = stack.enter_context(AutopilotProcess(self.plan.flavor, speedup=self.speedup, options=options))
         assert mock.control is not None
         self._control = stack.enter_context(Control(mock.control))
         judge = self.judge
         tap = Tap(mock.port, from_service=judge.from_service, from_autopilot=judge.from_autopilot)
         self._tap = stack.enter_context(tap)
-        self.folder.mkdir(parents=True)
+        if self.plan.aircraft > 1:
+            self._wing = Wing(
+                self.plan.aircraft,
+                stack,
+                speedup=self.speedup,
+                seed=self.plan.seed,
+                control=mock.control,
+                over=over,
+            )
         area, settings = self.folder / "area.geojson", self.folder / "settings.toml"
         area.write_text(json.dumps(ground.area()), encoding="utf-8")
         settings.write_text(SETTINGS, encoding="utf-8")
         self._runs = self.folder / "runs"
-        words = ["service", "--area", str(area), "--config", str(settings), "--runs", str(self._runs)]
-        words += ["--connect", self._tap.url, "--takeoff", "--seed", str(self.plan.seed)]
+        words = ["--area", str(area), "--config", str(settings), "--runs", str(self._runs)]
+        words += ["--connect", self._tap.url, *(self._wing.words if self._wing else [])]
+        words += ["--takeoff", "--seed", str(self.plan.seed), *over]
         self._launch(words)
         stack.callback(lambda: self._service.stop())
 
+    def _odd_from_the_start(self) -> list[str]:
+        """The mock's words for a file of faults, where the flight does not begin as it should."""
+        table = AT_BOOT[self.plan.at_boot]
+        if not table:
+            return []
+        self.outcome.faults[self.plan.at_boot] += 1
+        path = self.folder / "faults.toml"
+        lines = [f"{key} = {json.dumps(value)}" for key, value in table.items()]
+        path.write_text("\n".join(["[[fault]]", *lines, ""]), encoding="utf-8")
+        return ["--faults", str(path)]
+
     def _launch(self, words: list[str]) -> None:
         words = [*words, "--http", "127.0.0.1:0", "--speedup", f"{self.speedup:g}"]
-        self._service = Process(words)
+        self._service = Process(["sim.soak.clocked", *words], {clocked.CLOCK_FILE: str(self._clock.path)})
         self._url = self._service.wait_for(r"listening on (http://\S+)", _COMPILED_S).group(1)
         pid = self._service.process.pid
-        self._eyes = Eyes(self._url, pid, self._detector, 2.0 * self.speedup).__enter__()
+        own_clock = self.speedup == 1.0
+        eyes = Eyes(self._url, pid, self._detector, 2.0 * self.speedup, own_clock=own_clock)
+        if self._wing is not None:
+            eyes.aircraft = "1"
+            self._wing.look(self._url)
+        self._eyes = eyes.__enter__()
         self._finished.append(self._eyes)
 
     def _look_away(self) -> None:
@@ -131,21 +176,57 @@ class Flight:
     # ---- the flight
 
     def _play(self) -> None:
-        self._until(lambda: self._state() in _FLYING, "the search has not begun")
+        if self.plan.at_boot in GROUNDS:
+            self._stay_down(GROUNDS[self.plan.at_boot])
+            return
+        self._take_off()
         for fault in self.plan.faults:
             self._pass(fault.wait_s)
             if self._state() in _FINAL:
                 break
             self.outcome.faults[fault.kind] += 1
+            self.judge.steady, self.judge.during = KINDS[fault.kind].steady, fault.kind
             self._let(fault)
             self._recover()
         self._go_home()
+
+    def _take_off(self) -> None:
+        """The search begins; an operator helps where a person or the autopilot stands in the way."""
+        began = helped = time.monotonic()
+        while (state := self._state()) not in _FLYING:
+            now = time.monotonic()
+            if now - began > _PATIENCE_S or self._service.process.poll() is not None:
+                raise Trouble(f"the search has not begun, but is {state}")
+            if state in ("HOLDING", "YIELDED", "READY") and (now - helped) * self.speedup > _HELP_AFTER_S * 4:
+                helped = now
+                self._order("resume" if self._truth()["armed"] else "launch")
+            time.sleep(0.1)
+
+    def _stay_down(self, words: str) -> None:
+        """The service ends the run on the ground, and says why."""
+        code = self._service.exit_code(_PATIENCE_S)
+        self._look_away()
+        self.outcome.ended = "grounded"
+        if code != 4 or words not in " ".join(self._service.said.split()):
+            raise Trouble(f"ended with exit code {code} and without '{words}'")
+        if self.judge.motions["MAV_CMD_NAV_TAKEOFF"] or self._control.state()["armed"]:
+            raise Trouble(f"it has left the ground, though it '{words}'")
 
     def _let(self, fault: Fault) -> None:
         """Let one fault come and pass."""
         kind, eyes, options = fault.kind, self._eyes, dict(fault.options)
         if kind == "killed":
             self._kill()
+        elif kind in ("killed_while_held", "killed_while_yielded"):
+            self._stop_and_kill(kind == "killed_while_held", fault.seconds)
+        elif kind == "clock_steps":
+            self._clock.step(options["by_s"])
+            eyes.clock_off_s += options["by_s"]
+            self._pass(fault.seconds)
+        elif kind == "detector_lies":
+            eyes.lies = options["way"]
+            self._pass(fault.seconds)
+            eyes.lies = ""
         elif kind == "stall":
             self._service.process.send_signal(signal.SIGSTOP)
             if self._rng.random() < 0.5:  # what happens while nobody looks
@@ -164,12 +245,37 @@ class Flight:
             setattr(eyes, switch, False)
         elif kind == "operator_holds":
             self._order("hold")
+            self.judge.stopped(time.monotonic(), OPERATOR)
             self._pass(fault.seconds)
         else:
-            self._control.fault(kind.removesuffix("_sticks"), **options)
-            self._pass(fault.seconds)
-            if kind != "battery":
-                self._control.clear(kind.removesuffix("_sticks"))
+            self._let_the_mock(fault)
+
+    def _let_the_mock(self, fault: Fault) -> None:
+        """A fault of the mock's, under its own name."""
+        name = {"pilot_sticks": "pilot", "dead_reckoning": "gps_lost"}.get(fault.kind, fault.kind)
+        if name == "battery_unknown":  # low enough that it must not be forgotten
+            self._control.fault("battery", percent=float(self._rng.uniform(24.0, 30.0)))
+            self._pass(3.0)
+        self._control.fault(name, **fault.options)
+        if by := KINDS[fault.kind].stops:
+            self.judge.stopped(time.monotonic(), by)
+        self._pass(fault.seconds)
+        if name != "battery":
+            self._control.clear(name)
+
+    def _stop_and_kill(self, held: bool, seconds: float) -> None:
+        """A person has stopped the aircraft when the service dies: the next one leaves it so."""
+        if held:
+            self._order("hold")
+            self.judge.stopped(time.monotonic(), OPERATOR)
+        else:
+            self._control.fault("pilot")
+            self._pass(4.0)
+            self._control.clear("pilot")
+            self.judge.stopped(time.monotonic(), KINDS["killed_while_yielded"].stops)
+        self._pass(3.0)
+        self._kill()
+        self._pass(seconds)
 
     def _kill(self) -> None:
         """kill -9 and --resume: what was told before must still hold, and what was acknowledged be there."""
@@ -179,8 +285,13 @@ class Flight:
         if not self._alive_runs():
             raise Trouble("there is no run to go on with")
         self.judge.started_over()
-        self.judge.ordered(time.monotonic())  # --resume is an order to go on
-        self._launch(["service", "--resume", str(self._alive_runs()[0])])
+        if not self.judge.is_stopped:
+            self.judge.ordered(time.monotonic())  # --resume is an order to go on
+        self._control.ask(
+            speedup=1.0
+        )  # a computer that starts does so in its own time, and the battery is small
+        self._launch(["--resume", str(self._alive_runs()[0])])
+        self._control.ask(speedup=self.speedup)
 
     def _alive_runs(self) -> list[Path]:
         return sorted(self._runs.glob("*"))
@@ -216,7 +327,7 @@ class Flight:
         if code not in (0, 3, 4):
             raise Trouble(f"the service has ended with exit code {code}")
         self.outcome.ended = {0: "found", 3: "not found", 4: "aborted"}[code]
-        if self._control.state()["armed"]:
+        if self._control.state()["armed"] or (self._wing is not None and self._wing.aloft()):
             raise Trouble("the run has ended and the aircraft still flies")
 
     # ---- asking
@@ -237,7 +348,7 @@ class Flight:
         try:
             httpx.post(f"{self._url}/api/commands", json={"command": command}, timeout=40.0)
         except httpx.HTTPError as error:
-            self._wait_for_the_end(5.0)  # an order that comes when the run ends finds the door shut
+            self._wait_for_the_end(30.0)  # an order that comes when the run ends finds the door shut
             if self._service.process.poll() is None:
                 raise Trouble(f"the order '{command}' was not taken: {error}") from error
         self.judge.ordered(time.monotonic())
@@ -248,9 +359,20 @@ class Flight:
 
     def _pass(self, seconds: float) -> None:
         """Let so much vehicle time pass, or the flight end."""
-        until = self._control.state()["time"] + seconds
-        while self._control.state()["time"] < until and self._service.process.poll() is None:
+        until = self._truth()["time"] + seconds
+        while self._truth()["time"] < until and self._service.process.poll() is None:
             time.sleep(0.03)
+
+    def _truth(self) -> dict[str, Any]:
+        """What is true of the aircraft; the judge is told how high it is."""
+        state = self._control.state()
+        crashed = (
+            state["crashed"] and not self.outcome.faults["reboot"]
+        )  # in flight a reboot is the end of it
+        self.outcome.seconds = state["time"]
+        here = (state["latitude"], state["longitude"])
+        self.judge.truth(state["above_ground"], here, time.monotonic(), crashed=crashed)
+        return state
 
     def _until(self, condition: Callable[[], bool], complaint: str) -> None:
         deadline = time.monotonic() + _PATIENCE_S
@@ -264,38 +386,26 @@ class Flight:
     def _judge(self) -> None:
         outcome = self.outcome
         outcome.violations += self.judge.violations
+        if self._wing is not None:
+            outcome.violations += self._wing.judge.violations
+            outcome.together = self._wing.judge.together
         outcome.motions = self.judge.motions
         acknowledged: set[str] = set()
         told = []
+        true_hits: set[str] = set()
         for eyes in self._finished:
             outcome.violations += eyes.violations
             outcome.beliefs += eyes.beliefs
             acknowledged |= eyes.acknowledged
             told += eyes.told
-            outcome.violations += _grown(eyes)
-        outcome.reports = len(acknowledged)
+            true_hits |= eyes.true_hits
+            outcome.violations += grown(eyes)
+        outcome.reports, outcome.true_hits = len(acknowledged), len(true_hits & acknowledged)
+        place = self.plan.target
+        target = None if place is None else Target(place, frozenset(true_hits))
         for run in self._alive_runs() if hasattr(self, "_runs") else []:
-            outcome.violations += audit(run, acknowledged, told)
+            outcome.violations += audit(run, acknowledged, told, target)
         for word in _BAD_WORDS:
             if word in outcome.said:
                 line = next(line for line in outcome.said.splitlines() if word in line)
                 outcome.violations.append(f"the service has said: {line.strip()}")
-
-
-def _grown(eyes: Eyes) -> list[str]:
-    """Whether memory or tasks have grown from the middle of a process's life to its end."""
-    found = []
-    third = len(eyes.memory_mb) // 3
-    if third >= 10:
-        middle, end = (
-            float(np.median(part)) for part in (eyes.memory_mb[third:-third], eyes.memory_mb[-third:])
-        )
-        if end - middle > max(_GROWTH_MB, _GROWTH_PART * middle):
-            found.append(f"memory has grown from {middle:.0f} to {end:.0f} MB")
-    if eyes.memory_mb and not max(eyes.tasks, default=0):
-        found.append("the number of tasks is not told")
-    if max(eyes.tasks, default=0) > _MOST_TASKS:
-        found.append(f"{max(eyes.tasks)} tasks at a time")
-    if third >= 10 and eyes.tasks and min(eyes.tasks[-third:]) > max(eyes.tasks[third:-third]):
-        found.append(f"tasks have grown from {max(eyes.tasks[third:-third])} to {min(eyes.tasks[-third:])}")
-    return found

@@ -16,20 +16,29 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.soak import ground
-from sim.soak.tap import motion_name
+from sim.soak.tap import is_probe, motion_name
 
 _STATE = re.compile(r"search ([A-Z]+):")
 _SLACK_S = 0.6  # frames cross on the wire, and this process may have to wait for a processor
 _POSITIONS = 12
 _ORDER_S = 15.0
+_DRAIN = 1.3 * 100.0 / ground.ENDURANCE_S  # percent a second that flying takes at most
+_LEAST_PERCENT = 15.0  # the service goes home at 20
+_UNKNOWN_S = 30.0  # without a level for so long, it is not known on the ground
+_SETTLED_S = 25.0  # a search has reached its height after so long
 _NEAR_M = 60.0  # a stop lies this far ahead at most
+_BRAKE = 17  # ArduCopter's mode
+_STAND_STILL = "SET_POSITION_TARGET_LOCAL_NED"
+OPERATOR = "the operator's hold"
+AFTER = " [after {}]"
+"""What a violation says of the fault that came last."""
 _GUIDED = {"px4": 4 << 16 | 3 << 24, "ardupilot": 4}
 
 _FLY = {"SEARCHING", "CONFIRMING", "RETURNING"}
 _HOVER = {"HOLDING", "FOUND"}  # one stop, at the beginning
 _ALLOWED: dict[str, set[str]] = {
     "MAV_CMD_DO_REPOSITION": _FLY | _HOVER,
-    "MAV_CMD_DO_CHANGE_SPEED": {"SEARCHING", "CONFIRMING"},
+    "MAV_CMD_DO_CHANGE_SPEED": _FLY | _HOVER,  # moves nothing: sent again once the mode was entered anew
     "MAV_CMD_NAV_RETURN_TO_LAUNCH": {"RETURNING"},
     "MAV_CMD_COMPONENT_ARM_DISARM": {"TAKEOFF"},
     "MAV_CMD_NAV_TAKEOFF": {"TAKEOFF"},
@@ -40,7 +49,8 @@ _ALLOWED: dict[str, set[str]] = {
 class Judge:
     """Reads both directions of one link. `violations` are sentences."""
 
-    def __init__(self, flavor: str, speedup: float) -> None:
+    def __init__(self, flavor: str, speedup: float, *, hill: bool = False) -> None:
+        self._speedup, self._hill = speedup, hill
         self.violations: list[str] = []
         self.motions: Counter[str] = Counter()
         self.state = "WAITING"
@@ -49,20 +59,64 @@ class Judge:
         self._lock = threading.Lock()
         self._positions: deque[ground.LatLon] = deque(maxlen=_POSITIONS)
         self._not_guided_since = math.inf
+        self._armed = False
         self._taken_at = math.inf
         self._ordered_at = -math.inf
         self._sent_away_at = -math.inf  # when we last asked for another mode
         self._stop: ground.LatLon | None = None
+        self._homes: deque[float] = deque(maxlen=_POSITIONS)  # metres above sea level, as told
+        self._grounds: deque[float] = deque(
+            maxlen=_POSITIONS
+        )  # the same of the ground at the launch point, if the aircraft is where it was
+        self._altitude = ground.GROUND_AMSL_M
+        self._stopped_at, self._stopped_by = math.inf, ""
+        self._level: tuple[float, float] | None = None  # percent, when
+        self._state_since = -math.inf
+        self._too_close = False
+        self._braked = False  # and not flown on since
+        self._crashed = False
+        self.steady = False  # nothing goes on that may lower the aircraft
+        self.during = ""  # the fault that came last
+
+    def _see(self, violation: str) -> None:
+        self.violations.append(f"{violation}{AFTER.format(self.during)}" if self.during else violation)
 
     def ordered(self, now: float) -> None:
         """An operator has just ordered something: the aircraft may be taken from its pilot."""
         with self._lock:
             self._ordered_at, self._taken_at = now, math.inf
+            self._stopped_at, self._stopped_by = math.inf, ""
+
+    def stopped(self, now: float, by: str) -> None:
+        """A person (`by`) has stopped the aircraft: until an operator orders something nothing of ours moves it."""
+        with self._lock:
+            self._stopped_at, self._stopped_by = now, by
+
+    @property
+    def is_stopped(self) -> bool:
+        """Has a person stopped the aircraft, and nobody ordered anything since?"""
+        with self._lock:
+            return bool(self._stopped_by) or self._taken_at < math.inf
+
+    def truth(self, up: float, here: ground.LatLon, now: float, *, crashed: bool = False) -> None:
+        """Where the aircraft truly is, `up` metres above the ground below it, whatever it tells; or that it has
+        crashed."""
+        with self._lock:
+            if crashed and not self._crashed:
+                self._crashed = True
+                self._see(f"the aircraft has crashed in {self.state}")
+            self._grounds.append(self._altitude - up - ground.rise(here, hill=self._hill))
+            searching = self.state in ("SEARCHING", "CONFIRMING")
+            settled = searching and self.steady and (now - self._state_since) * self._speedup > _SETTLED_S
+            too_close = ground.too_close(here, up, hill=self._hill) if settled else ""
+            if too_close and not self._too_close:
+                self._see(f"closer than allowed in {self.state}: {too_close}")
+            self._too_close = bool(too_close)
 
     def started_over(self) -> None:
         """The service is another process now."""
         with self._lock:
-            self.state, self._taken_at = "WAITING", math.inf
+            self.state, self._state_since = "WAITING", -math.inf
 
     def from_autopilot(self, message: Any, now: float) -> None:
         """A message on its way to the service."""
@@ -71,7 +125,13 @@ class Judge:
         with self._lock:
             if message.get_type() == "GLOBAL_POSITION_INT":
                 self._positions.append((message.lat * 1e-7, message.lon * 1e-7))
+                self._altitude = message.alt / 1000.0
+                self._homes.append((message.alt - message.relative_alt) / 1000.0)
+            elif message.get_type() in ("SYS_STATUS", "BATTERY_STATUS"):
+                if message.battery_remaining >= 0:
+                    self._level = (float(message.battery_remaining), now)
             elif message.get_type() == "HEARTBEAT":
+                self._armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
                 self._heard_mode(message.custom_mode == self._guided_mode, now)
 
     def _heard_mode(self, guided: bool, now: float) -> None:
@@ -89,30 +149,76 @@ class Judge:
             if message.get_type() == "STATUSTEXT":
                 if (told := _STATE.match(message.text)) and told.group(1) != self.state:
                     self.state, self._stop = told.group(1), None
+                    self._state_since = now
                 return
+            if is_probe(message) and (self._guided_mode == _GUIDED["px4"] or self._armed):
+                self._see("a place that is not on earth is asked for in flight, or of who would fly there")
             name = motion_name(message)
             if not name:
                 return
             self.motions[name] += 1
             for objection in self._objections(name, message, now):
-                self.violations.append(f"{name} in {self.state}: {objection}")
+                self._see(f"{name} in {self.state}: {objection}")
 
     def _objections(self, name: str, message: Any, now: float) -> list[str]:
+        taken = now - self._taken_at
+        found = [f"the pilot has had the aircraft for {taken:.2f} s"] if taken > self._late_s else []
+        if self._is_brake(name, message):
+            self._sent_away_at = now
+            return found
         if name not in _ALLOWED:
             return ["this service has no use for it"]
         recently_ordered = now - self._ordered_at < _ORDER_S
-        found = []
         if name in ("MAV_CMD_NAV_RETURN_TO_LAUNCH", "MAV_CMD_DO_SET_MODE"):
             self._sent_away_at = now
-        if self.state not in _ALLOWED[name] and not (name == "MAV_CMD_DO_SET_MODE" and recently_ordered):
+        leads_out = name == "MAV_CMD_DO_SET_MODE" and (recently_ordered or self._braked)
+        if self.state not in _ALLOWED[name] and not leads_out:
             found.append("not in this state")
-        if now - self._taken_at > self._late_s:
-            found.append(f"the pilot has had the aircraft for {now - self._taken_at:.2f} s")
         if name == "MAV_CMD_DO_REPOSITION":
             found += self._reposition(message, now)
-        return found
+        return [*found, *self._against_a_person(name, now), *self._on_an_unknown_battery(name, now)]
+
+    def _is_brake(self, name: str, message: Any) -> bool:
+        """Stops that need no position, while it hovers: a reposition to nowhere, the mode BRAKE, no velocity."""
+        if name == "MAV_CMD_DO_REPOSITION" and message.get_type() == "COMMAND_LONG":
+            stops = math.isnan(message.param5) and math.isnan(message.param6) and message.param2 == 0.0
+        elif name == "MAV_CMD_DO_SET_MODE":
+            stops = self._guided_mode == _GUIDED["ardupilot"] and message.param2 == _BRAKE
+        else:
+            velocity = [getattr(message, axis, 1.0) for axis in ("vx", "vy", "vz")]
+            stops = name.startswith(_STAND_STILL) and not any(velocity)
+        braked = stops and self.state in _HOVER | _FLY
+        self._braked = braked or (self._braked and name != "MAV_CMD_DO_REPOSITION")
+        return braked
+
+    def _against_a_person(self, name: str, now: float) -> list[str]:
+        """It may stop or fly home after an operator's hold; after anybody else's word nothing at all."""
+        late = now - self._stopped_at
+        own = self._stopped_by == OPERATOR and self.state in _HOVER | {"RETURNING"}
+        if late <= self._late_s or own or name == "MAV_CMD_DO_CHANGE_SPEED":
+            return []
+        by, self._stopped_at = self._stopped_by, math.inf  # one violation is enough
+        return [f"moved {late:.2f} s after a person's stop ({by})"]
+
+    def _on_an_unknown_battery(self, name: str, now: float) -> list[str]:
+        if name in ("MAV_CMD_COMPONENT_ARM_DISARM", "MAV_CMD_NAV_TAKEOFF"):
+            if self._level is None or (now - self._level[1]) * self._speedup > _UNKNOWN_S:
+                return ["took off on an unknown battery"]
+            return []
+        if name != "MAV_CMD_DO_REPOSITION" or self.state not in ("SEARCHING", "CONFIRMING"):
+            return []
+        if self._level is None:
+            return ["flew on an unknown battery: no level was ever told"]
+        percent, at = self._level
+        if percent - (now - at) * self._speedup * _DRAIN >= _LEAST_PERCENT:
+            return []
+        return [
+            f"flew on an unknown battery: {percent:.0f} % were told {(now - at) * self._speedup:.0f} s ago"
+        ]
 
     def _reposition(self, message: Any, now: float) -> list[str]:
+        if message.get_type() != "COMMAND_INT":
+            return ["a place in a message that cannot carry it exactly"]
         there = (message.x * 1e-7, message.y * 1e-7)
         found = []
         if now - self._not_guided_since > self._late_s:
@@ -128,9 +234,12 @@ class Judge:
             objections = [ground.why_not(here, there, searching=searching) for here in self._positions]
             if objections and all(objections):
                 found.append(objections[-1])
-            height = message.z - ground.GROUND_AMSL_M
-            if abs(height - ground.HEIGHT_M) > 1.0:
-                found.append(f"{height:.1f} m above home")
+            below = [*self._grounds, *self._homes] or [
+                ground.GROUND_AMSL_M
+            ]  # somebody may have moved home alone
+            wrong = [ground.wrong_height(there, message.z - each, hill=self._hill) for each in below]
+            if all(wrong):
+                found.append(wrong[-1])
         if message.param2 != 0:
             found.append("it may change the mode")
         if message.frame != mavlink.MAV_FRAME_GLOBAL:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -15,12 +16,12 @@ ROOT = Path(__file__).parents[2]
 
 
 class Process:
-    """`python -m words`; everything it says, on both its outputs, is kept in `said`."""
+    """`python -m words`; everything it says, on both its outputs, is kept in `said`. `environment` adds to our own."""
 
     running: ClassVar[set[Process]] = set()
     """All that were started and not stopped yet."""
 
-    def __init__(self, words: Sequence[str]) -> None:
+    def __init__(self, words: Sequence[str], environment: Mapping[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
             [sys.executable, "-m", *words],
             cwd=ROOT,
@@ -28,6 +29,7 @@ class Process:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            env={**os.environ, **(environment or {})},
         )
         self.running.add(self)
         self.said = ""

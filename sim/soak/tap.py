@@ -19,9 +19,17 @@ HARMLESS = {
 Listener = Callable[[Any, float], None]
 
 
+def is_probe(message: Any) -> bool:
+    """A reposition to what is no place on earth, which asks whether the command is known."""
+    reposition = getattr(message, "command", None) == mavlink.MAV_CMD_DO_REPOSITION
+    return reposition and message.get_type() == "COMMAND_INT" and bool(abs(message.x) > 900_000_000)
+
+
 def motion_name(message: Any) -> str:
     """What a message of the service's asks the aircraft to do; nothing when it asks for no motion."""
     name = str(message.get_type())
+    if is_probe(message):
+        return ""
     command = getattr(message, "command", None)
     if not (name.startswith("SET_") or (name in ("COMMAND_INT", "COMMAND_LONG") and command not in HARMLESS)):
         return ""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roisearch import PLANNERS, FieldOfView, Planner, make_planner
+from roisearch.planners.outside import is_outside
 from sim.scenario import PAPER_SHAPE, PAPER_START, PAPER_STEPS, paper_prior
 
 FOVS = ("point", "donut", "wide-angle")
@@ -165,9 +166,9 @@ class Campaign:
             ValueError: when there is no such planner, preset or option.
         """
         name, preset, options = parse_planner(spec)
-        if name not in PLANNERS:
+        if name not in PLANNERS and not is_outside(name):
             raise ValueError(f"there is no planner '{name}'; there is {', '.join(PLANNERS)}")
-        if name.startswith("puct"):
+        if name in PLANNERS and name.startswith("puct"):
             options = {"preset": preset or self.preset, **options}
             if self.iterations is not None or self.deadline_s is not None:
                 options.setdefault("iterations", self.iterations)
@@ -193,12 +194,14 @@ class Campaign:
 
 
 def parse_planner(spec: str) -> tuple[str, str, dict[str, Any]]:
-    """Name, preset (or empty) and options of "name[@preset][:option=value]...".
+    """Name, preset (or empty) and options of "name[@preset][:option=value]..."; a name may be "module:Class".
 
     Raises:
         ValueError: when an option has no value.
     """
     head, *settings = spec.split(":")
+    if settings and "=" not in settings[0] and head.partition("@")[0] not in PLANNERS:
+        head, *settings = f"{head}:{settings[0]}", *settings[1:]  # package.module:Class
     name, _, preset = head.partition("@")
     options: dict[str, Any] = {}
     for setting in settings:

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import shlex
 import sys
 import time
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TaskID,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress, TaskID
 from rich.table import Table
 
 from roisearch import PLANNERS
+from sim.progress import Rest, bars, span
+from sim.trials.battery_cli import is_battery
+from sim.trials.battery_cli import main as battery
 from sim.trials.campaign import (
     FOVS,
     PAPER_PLANNERS,
@@ -32,10 +27,16 @@ from sim.trials.campaign import (
     Job,
     load_prior,
 )
-from sim.trials.journal import Journal, Refused
-from sim.trials.pool import executor, run
+from sim.trials.fleet_cli import fly_fleets, is_fleet
+from sim.trials.flight_cli import fly, is_flight
+from sim.trials.forecast import Forecast
+from sim.trials.journal import Journal, Refused, with_earlier_planners
+from sim.trials.pool import executor, exit_code, run
 from sim.trials.published import shown
 from sim.trials.report import percent, write_report
+from sim.trials.trial import run_job
+from sim.trials.walking_cli import is_walking
+from sim.trials.walking_cli import main as walking
 
 _CURVES, _PAPER_CURVES = 40, 20
 _BOUNDS = "bounds"
@@ -46,12 +47,17 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="roisearch-sim trials",
         description="Search many random priors with each planner, and report steps, detection curves, times and how "
-        "far above the bound they are. Run again with the same --out, it continues where it ended.",
+        "far above the bound they are. Run again with the same --out, it continues where it ended, and takes planners "
+        "that are new to it.",
+        epilog="Other campaigns, each with a --help of its own: --preset flight (seconds of flight), --preset battery "
+        "(the end of a battery planned or cut off), --preset walking (a target that walks; with --optimum "
+        "beside the best flight), "
+        "--searchers N,.. (several searchers on one belief).",
     )
     p.add_argument(
         "--planners",
         metavar="A,B,..",
-        help=f"NAME[@PRESET][:OPTION=VALUE].. each; names: {', '.join(PLANNERS)}",
+        help=f"NAME[@PRESET][:OPTION=VALUE].. each; names: {', '.join(PLANNERS)}, or package.module:Class",
     )
     p.add_argument("--fov", metavar="F,..", help=f"{', '.join(FOVS)} (default point)")
     p.add_argument(
@@ -69,9 +75,12 @@ def parser() -> argparse.ArgumentParser:
         help="drawn targets, exact curves, or both (default sampled; with --curves or --preset paper both)",
     )
     p.add_argument("--seed", type=int, default=1, metavar="S", help="same seed, same numbers (default 1)")
-    p.add_argument("--preset", choices=("default", "paper", "reference"), default="default",
+    presets = ("default", "paper", "reference", "flight", "battery", "walking")
+    p.add_argument("--preset", choices=presets, default="default",
                    help="of the tree searches; 'paper' also sets the paper's planners, FOVs (the baselines with the "
-                   "point FOV only, as in the paper), trials, and --found covered, unless they are given")  # fmt: skip
+                   "point FOV only, as in the paper), trials, and --found covered, unless they are given; 'flight' is "
+                   "another campaign: seconds of flight, see 'trials --preset flight --help'; and 'battery' and "
+                   "'walking' are too: what one battery finds, and a target that walks")  # fmt: skip
     p.add_argument("--found", choices=("hit", "covered"), help="what ends a search: the first true hit (default), or "
                    "the target in view")  # fmt: skip
     p.add_argument(
@@ -145,12 +154,20 @@ def campaign_from(options: argparse.Namespace) -> Campaign:
 
 def main(arguments: list[str]) -> int:
     """Run it; 0 when all is done, 2 for bad input, 1 when a worker died, 130 when interrupted."""
+    if is_flight(arguments):
+        return fly(arguments)
+    if is_battery(arguments):
+        return battery(arguments)
+    if is_walking(arguments):
+        return walking(arguments)
+    if is_fleet(arguments):
+        return fly_fleets(arguments)
     options = parser().parse_args(arguments)
     console = Console()
     try:
         if options.jobs < 1:
             raise ValueError(f"--jobs must be at least 1, not {options.jobs}")
-        campaign = campaign_from(options)
+        campaign = with_earlier_planners(options.out, campaign_from(options))
         with Journal(options.out, campaign) as journal:
             return _work(campaign, journal, options, console, arguments)
     except (Refused, ValueError) as error:
@@ -163,25 +180,20 @@ def _work(
 ) -> int:
     """Do what is not done yet, then write the report, also of a part."""
     jobs = journal.left(campaign.jobs(), campaign)
-    code, began = 0, time.monotonic()
+    code, began, there = 0, time.monotonic(), len(journal.results)
     if journal.results and jobs:
         console.print(f"{len(journal.results)} results are there already")
-    try:
-        if jobs:
-            _run_all(campaign, journal, jobs, options, console)
-    except KeyboardInterrupt:
-        console.print("interrupted; the same command continues")
-        code = 130
-    except BrokenProcessPool:
-        print("roisearch-sim trials: a worker died; the same command continues", file=sys.stderr)
-        code = 1
+    if jobs:
+        code = exit_code(lambda: _run_all(campaign, journal, jobs, options, console), console)
     command = shlex.join(["roisearch-sim", "trials", *arguments])
     if journal.results:
         summary = write_report(campaign, journal.results, options.out, command)
         console.print(_table(summary))
         took = time.monotonic() - began
+        done = len(journal.results) - there
+        left = f" of {len(jobs)}" if code else ""
         console.print(
-            f"{len(jobs)} jobs in {took:.0f} s; report: {options.out / 'report.md'}", highlight=False
+            f"{done}{left} jobs done in {span(took)}; report: {options.out / 'report.md'}", highlight=False
         )
     return code
 
@@ -191,27 +203,34 @@ def _run_all(
 ) -> None:
     """Run the jobs under progress bars: one for everything, one for each planner."""
     with (
-        Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-            TimeRemainingColumn(), console=console,
-        ) as progress,
-    ):  # fmt: skip
+        bars(console) as progress,
+    ):
         if not options.scheduler:
+            if not console.is_terminal:  # where there are no bars
+                console.print("compiling what the planners need, which is kept for the next time")
             _compile(campaign, progress)
         with executor(options.jobs, options.scheduler) as (pool, workers):
-            everything = progress.add_task(f"all, {workers} workers", total=len(jobs))
-            bars: dict[str, TaskID] = {}
+            everything, rest = (
+                progress.add_task(f"all, {workers} workers", total=len(jobs)),
+                Rest(console, len(jobs)),
+            )
+            bar_of: dict[str, TaskID] = {}
             for name in [*campaign.planners, ""]:
                 count = sum(job.planner == name for job in jobs)
                 if count:
-                    bars[name] = progress.add_task(f"  {shown(name) if name else _BOUNDS}", total=count)
+                    bar_of[name] = progress.add_task(f"  {shown(name) if name else _BOUNDS}", total=count)
+
+            forecast = Forecast(jobs, workers)
 
             def done(job: Job, results: list[dict[str, Any]]) -> None:
                 journal.add(results)
+                if said := forecast.done(job, results):
+                    console.print(said, highlight=False)
                 progress.advance(everything)
-                progress.advance(bars[job.planner])
+                progress.advance(bar_of[job.planner])
+                rest.advance()
 
-            run(pool, workers, campaign, jobs, done)
+            run(pool, workers, functools.partial(run_job, campaign), jobs, done)
 
 
 def _compile(campaign: Campaign, progress: Progress) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
 
 from sim.trials import published
 from sim.trials.published import shown
@@ -307,6 +308,28 @@ def _curves(summary: dict[str, Any]) -> Figure:
     figure.tight_layout(rect=(0, 0.02 + 0.05 * (-(-len(handles) // columns)), 1, 1.0))
     figure.legend(handles=handles, loc="lower left", ncols=columns, frameon=False, fontsize=8.5)
     return figure
+
+
+def draw_means(
+    minutes: NDArray[np.float64],
+    curves: Mapping[str, NDArray[np.float64]],
+    marks: Sequence[float],
+    path: Path,
+) -> None:
+    """Draw `curves`, what was found by each of `minutes`, float [n] each, with lines at `marks`, minutes."""
+    with plt.style.context(_STYLE):
+        figure, axes = plt.subplots(figsize=(7.2, 4.0))
+        for shade, (name, curve) in zip(_SPARE, curves.items(), strict=False):
+            axes.plot(minutes, curve, color=shade, lw=1.8, label=name)
+        for mark in marks:
+            axes.axvline(mark, color=_SOFT, lw=0.9, ls=(0, (4, 3)))
+        axes.set_xlim(0, minutes[-1])
+        axes.set_ylim(0, 1.0)
+        axes.grid(color=_GRID, zorder=0)
+        axes.set_xlabel("minutes")
+        axes.set_ylabel("F(t), probability of detection")
+        axes.legend(loc="lower right", frameon=False)
+        _save(figure, path)
 
 
 def _with_curve(summary: dict[str, Any], fov: str) -> list[dict[str, Any]]:

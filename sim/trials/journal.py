@@ -10,13 +10,26 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 from sim.trials.campaign import Campaign, Job
 
 FORMAT = 1
+
+
+class Described(Protocol):
+    """A campaign, as far as its folder is concerned."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The settings as plain JSON values."""
+        ...
+
+    def search_of(self, job: Job) -> Job | None:
+        """The job whose result comes with that of `job`."""
+        ...
 
 
 class Refused(ValueError):
@@ -45,7 +58,7 @@ class Journal:
         Refused: when the folder holds another campaign, or is no folder.
     """
 
-    def __init__(self, folder: Path, campaign: Campaign) -> None:
+    def __init__(self, folder: Path, campaign: Described) -> None:
         self.folder = folder
         settings = {"format": FORMAT, **campaign.to_dict()}
         try:
@@ -53,9 +66,10 @@ class Journal:
         except OSError as error:
             raise Refused(f"{folder} cannot hold the results: {error.strerror}") from None
         described = folder / "campaign.json"
-        if described.exists():
-            _compare(folder, json.loads(described.read_text(encoding="utf-8")), settings)
-        else:
+        there = json.loads(described.read_text(encoding="utf-8")) if described.exists() else None
+        if there is not None:
+            _compare(folder, there, settings)
+        if there is None or there["planners"] != settings["planners"]:
             write_whole(described, json.dumps(settings, indent=2) + "\n")
         self._path = folder / "journal.jsonl"
         self.results: dict[Job, dict[str, Any]] = {}
@@ -79,7 +93,7 @@ class Journal:
                     f"line {number} of {self._path} is damaged; delete it to redo its job"
                 ) from None
 
-    def left(self, jobs: Sequence[Job], campaign: Campaign) -> list[Job]:
+    def left(self, jobs: Sequence[Job], campaign: Described) -> list[Job]:
         """The jobs that are to be done, without those whose results come with another's."""
         pending = [job for job in jobs if job not in self.results]
         given = {campaign.search_of(job) for job in pending}
@@ -101,9 +115,23 @@ class Journal:
         os.close(self._file)
 
 
+def with_earlier_planners(folder: Path, campaign: Campaign) -> Campaign:
+    """The campaign with the planners that its folder has already before its own: one may be added at any time, and
+    flies over the maps that the others flew over."""
+    try:
+        there = json.loads((folder / "campaign.json").read_text(encoding="utf-8"))["planners"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return campaign  # there is none, or `Journal` says what is wrong with it
+    earlier = [name for name in there if isinstance(name, str)]
+    added = [name for name in campaign.planners if name not in earlier]
+    return replace(campaign, planners=(*earlier, *added))
+
+
 def _compare(folder: Path, there: dict[str, Any], here: dict[str, Any]) -> None:
     """Raise when the settings differ, naming the first that does."""
     plain = json.loads(json.dumps(here))
+    if plain["planners"][: len(there["planners"])] == there["planners"]:
+        there = {**there, "planners": plain["planners"]}  # others came to them
     for key in [*plain, *there]:
         if there.get(key) != plain.get(key):
             raise Refused(

@@ -5,15 +5,18 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.synchronize import Event
 from typing import Any
 
-from sim.trials.campaign import Campaign, Job
-from sim.trials.trial import run_job
+from rich.console import Console
+
+from sim.trials.campaign import Job
 
 CONNECT_TIMEOUT_S = 15.0
 """How long a Dask scheduler may take to answer."""
@@ -88,21 +91,21 @@ def _cluster(scheduler: str) -> Iterator[tuple[Executor, int]]:
 def run(
     pool: Executor,
     workers: int,
-    campaign: Campaign,
+    work: Callable[[Job], list[dict[str, Any]]],
     jobs: Sequence[Job],
     done: Callable[[Job, list[dict[str, Any]]], None],
 ) -> None:
-    """Run the jobs in any order; `done` is called here, in this thread, for each as it ends.
+    """Run `work` on the jobs in any order; `done` is called here, in this thread, for each as it ends.
 
     Raises:
-        Whatever a job raises; what was handed in and not begun is then cancelled.
+        Whatever `work` raises; what was handed in and not begun is then cancelled.
     """
     left = iter(jobs)
     waiting: dict[Future[list[dict[str, Any]]], Job] = {}
 
     def hand_in(count: int) -> None:
         for _, job in zip(range(count), left, strict=False):
-            waiting[pool.submit(run_job, campaign, job)] = job
+            waiting[pool.submit(work, job)] = job
 
     hand_in(_AHEAD * workers)
     try:
@@ -115,3 +118,16 @@ def run(
     finally:
         for future in waiting:
             future.cancel()
+
+
+def exit_code(work: Callable[[], None], console: Console) -> int:
+    """Do the work of a campaign; what a shell is told of it: 0 done, 130 interrupted, 1 a worker died."""
+    try:
+        work()
+    except KeyboardInterrupt:
+        console.print("interrupted; the same command continues")
+        return 130
+    except BrokenProcessPool:
+        print("roisearch-sim trials: a worker died; the same command continues", file=sys.stderr)
+        return 1
+    return 0

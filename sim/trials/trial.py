@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from roisearch import Belief, SearchState, bounds, segment_regions
 from roisearch.fov import HEADINGS, MOVES, FieldOfView
 from sim.trials.campaign import BOUND, CURVE, SEARCH, Campaign, Job, Scenario
-from sim.trials.world import look
+from sim.trials.world import Ground, Sight, Truth, View, look
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 GRID_POINTS = 240
@@ -134,19 +134,17 @@ class _Run:
         """Fly until the target is found and the curve followed to its tail, or to the cap."""
         campaign, job, now = self.campaign, self.job, _Tally()
         prior = self.scenario.prior
-        cols = prior.shape[1]
         fov = campaign.fov(job.fov)
         planner = campaign.planner(job.planner, job.fov, self.scenario.flyable)
         belief = Belief(prior)
         k = len(fov.p_tp)
-        cells, hits = np.zeros((k, 2), dtype=np.int64), np.zeros(k, dtype=np.bool_)
-        tp, tn = np.zeros(k), np.zeros(k)
-        undetected = np.ascontiguousarray(prior).ravel().copy()
-        seen = np.zeros(prior.size, dtype=np.bool_)
+        truth = Truth(self.target, campaign.found == "covered", self.follow)
+        view, sight = View(fov.offsets, fov.p_tp, fov.p_tn), Sight.of(k)
+        ground = Ground(np.array(prior, order="C"), np.zeros(prior.shape, dtype=np.bool_))
         noise, rng = campaign.rng(job.trial, 2), campaign.rng(job.trial, 3)
         draws, first = noise.random(_DRAWS * k), 0
         state = SearchState(campaign.start, HEADINGS[0])
-        covered, deadline = campaign.found == "covered", campaign.deadline_s
+        deadline = campaign.deadline_s
         following, left = self.follow, 1.0
         clock = time.thread_time  # planning is one thread; wall time would count the other workers
         while now.steps < campaign.cap:
@@ -161,9 +159,8 @@ class _Run:
             if first == draws.size:
                 draws, first = noise.random(_DRAWS * k), 0
             count, found, gained, fresh, false = look(
-                cell[0], cell[1], heading, self.target, covered, self.follow, fov.offsets, fov.p_tp, fov.p_tn, draws,
-                first, undetected, seen, cols, cells, hits, tp, tn,
-            )  # fmt: skip
+                cell, heading, truth, view, draws[first : first + k], ground, sight
+            )
             first += k
             now.steps += 1
             now.cells += fresh
@@ -181,7 +178,8 @@ class _Run:
                     self._end_curve(now)
                     if self.found or self.target < 0:
                         break
-            belief.observe(cells[:count], hits[:count], tp[:count], tn[:count])
+            cells, hits, tp, tn = (part[:count] for part in sight)
+            belief.observe(cells, hits, tp, tn)
         if following:
             self._end_curve(now)
         if not self.found:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, Response, expect
 
 from sim.autopilot.control import Control
 from sim.autopilot.process import AutopilotProcess
@@ -113,8 +113,13 @@ class Watch:
         self.asked: list[str] = []
         self.page.on("console", lambda said: said.type == "error" and self.complaints.append(said.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("response", self._note)
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(url)
+
+    def _note(self, answer: Response) -> None:
+        if answer.status >= 500:
+            self.complaints.append(f"{answer.status} for {answer.url}")
 
     @property
     def chip(self) -> Locator:
@@ -124,7 +129,7 @@ class Watch:
     def shows(self, *states: str) -> None:
         """Wait until the page shows one of these states."""
         self.page.wait_for_function(
-            "(states) => states.includes(document.getElementById('chip').textContent)",
+            "(states) => states.includes(document.getElementById('chip').dataset.state)",
             arg=list(states),
             timeout=PATIENCE_MS,
         )
@@ -134,10 +139,10 @@ class Watch:
         return self.page.locator("#orders").get_by_role("button", name=name)
 
     def violations(self) -> list[Any]:
-        """What axe finds that is serious or worse."""
+        """What axe finds, be it serious or not."""
         self.page.evaluate(AXE.read_text(encoding="utf-8"))
         found: list[Any] = self.page.evaluate(AXE_RUN)
-        return [each for each in found if each[0] in ("serious", "critical")]
+        return found
 
     def painted(self, layer: str) -> int:
         """How many pixels of a layer of cells are not clear."""

@@ -16,8 +16,9 @@ from playwright.sync_api import Browser, expect
 from service.area import build_grid, read_area
 from service.config import Settings
 from service.evidence.observe import Observation
-from service.evidence.verdict import verdict_on, verdict_row
+from service.evidence.verdict import verdict_on
 from service.journal import Journal
+from service.rows import VerdictRow
 from tests.integration.flight import running, write_area
 
 from .stage import Watch
@@ -55,7 +56,7 @@ def write_run(folder: Path) -> Path:
     hit = np.unravel_index(best[15], grid.frame.shape)
     cell = (int(hit[0]), int(hit[1]))
     rejected = verdict_on(cell, grid.frame.shape, 0.99, confirmed=False)
-    note(2.0 * STEPS, "verdict", verdict_row(cell, rejected, confirmed=False))
+    note(2.0 * STEPS, "verdict", VerdictRow(False, cell, rejected).body())
     assert last is not None
     last.result(10)
     journal.close()
@@ -75,7 +76,8 @@ def replay(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def test_a_replay_has_every_time_and_takes_no_orders(replay: str) -> None:
-    with httpx.Client(base_url=replay, headers={"authorization": f"Bearer {TOKEN}"}) as door:
+    headers = {"authorization": f"Bearer {TOKEN}"}
+    with httpx.Client(base_url=replay, headers=headers, timeout=60.0) as door:
         assert door.get("/api/replay").json() == {"from": START, "to": START + 80.0}
         pos = [door.get("/api/state", params={"at": START + at}).json()["pos"] for at in (0, 20, 40, 79, 20)]
         assert 0.0 == pos[0] < pos[1] < pos[2] < pos[3]
@@ -107,17 +109,18 @@ def test_the_page_asks_for_the_token_and_then_shows_the_run_with_a_slider(
     expect(page.locator("#chip")).to_have_text("a token is needed")
     page.get_by_label("Token").fill("wrong-token-0123456789")
     page.keyboard.press("Enter")
-    expect(page.locator("#refused")).to_contain_text("token")
+    expect(page.locator("#refused")).to_contain_text("none of this service's tokens")
     page.get_by_label("Token").fill(TOKEN)
     page.keyboard.press("Enter")
-    watch.shows("SEARCHING (replay)")
+    watch.shows("SEARCHING")
+    expect(page.locator("#chip")).to_have_text("Searching (replay)")
     assert TOKEN not in "".join(watch.asked)
     expect(page.locator("#orders")).to_be_hidden()
     end = page.locator("#pos").inner_text()
     slider = page.get_by_role("slider", name="Time")
     slider.fill("20")
     expect(page.locator("#clock")).to_have_text("20 s of 80 s")
-    expect(page.locator("#reason")).to_have_text("step 10")
+    expect(page.locator("#next")).to_contain_text("60 m")
     assert float(page.locator("#pos").inner_text().split()[0]) < float(end.split()[0])
     assert page.locator(".leaflet-flight-pane path").count() > 0
     slider.focus()

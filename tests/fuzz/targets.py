@@ -17,26 +17,28 @@ from typing import Any
 
 import httpx
 import numpy as np
-from prometheus_client import CollectorRegistry
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from roisearch import Belief
 from service.area import build_grid, parse_area
+from service.area.faults import BadArea
 from service.clock import Clock
 from service.config import Settings, read_settings
 from service.errors import BadInput
 from service.evidence.intake import Intake
-from service.evidence.observe import Observation, Pose, Sensor
-from service.evidence.reports import Receipt, Report
+from service.evidence.mask import Sensor
+from service.evidence.moments import Moments
+from service.evidence.observe import FramePose, Observation
+from service.evidence.reports import OrderReceipt, Receipt, Report
 from service.http import create_app, split_address
 from service.journal import Journal
 from service.mavlink import NotPermitted
 from service.mavlink.core import LinkCore
-from service.mavlink.settings import LinkSettings
+from service.mavlink.settings import MavlinkSettings
 from service.mavlink.url import parse_url
 from service.search import Search
 from tests.integration.flight import FIELD
-from tests.service.mavlink_peer import START, Peer
+from tests.service.mavlink.peer import START, Peer
 
 CELL_M = 10.0
 SYSTEM = 7
@@ -91,7 +93,7 @@ def fuzz_mavlink(data: bytes) -> None:
     if not data:
         return
     flavor, paired, signed = ("px4", "ardupilot")[data[0] & 1], data[0] & 2, data[0] & 4
-    core = LinkCore(LinkSettings(signing_key=b"k" * 32 if signed else None), speaks_first=True)
+    core = LinkCore(MavlinkSettings(signing_key=b"k" * 32 if signed else None), speaks_first=True)
     now = START
     if paired and not signed:
         core.receive_data(Peer(flavor, system=SYSTEM).heartbeat(), now)
@@ -124,7 +126,7 @@ def _look_from(core: LinkCore, now: float) -> None:
     pose = core.history.pose_at(now)
     if pose is not None:
         sensor = sensor_of(_field)
-        sensor.footprint(Pose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, now))
+        sensor.footprint(FramePose(pose.lat, pose.lon, pose.alt_home_m, pose.heading_deg, now))
 
 
 # ---- area files
@@ -146,11 +148,14 @@ def fuzz_area(data: bytes) -> None:
 
 
 def assert_sentence(error: BadInput) -> None:
-    """A message for a person: one line, not endless, and something that any terminal can show."""
+    """A message for a person: one line, or one for each fault of an area file and one before them; not endless, and
+    something that any terminal can show."""
     text = str(error)
-    assert text
-    assert len(text) < 2000
-    assert "\n" not in text
+    first, *faults = text.split("\n")
+    assert first
+    assert len(text) < 2000 * (1 + len(faults))
+    assert not faults or (isinstance(error, BadArea) and len(faults) > 1)
+    assert all(fault.startswith("  ") and fault.strip() for fault in faults)
     text.encode("utf-8")
 
 
@@ -180,14 +185,18 @@ class OpenDoor:
     def __init__(self) -> None:
         self._folder = tempfile.TemporaryDirectory()
         self._runner = asyncio.Runner()
-        self.registry = CollectorRegistry()
         self.search = field_search()
         self._journal = Journal(Path(self._folder.name) / "journal.sqlite")
         clock = Clock()
         lat, lon = self.search.grid.frame.to_latlon([[3, 3]])[0]
-        here = Pose(float(lat), float(lon), 30.0, 0.0, clock.now())
+        here = FramePose(float(lat), float(lon), 30.0, 0.0, clock.now())
         self.intake = Intake(
-            self.search, sensor_of(self.search), self._journal, clock, lambda moment: here, self._told
+            self.search,
+            sensor_of(self.search),
+            self._journal,
+            Moments(clock),
+            lambda moment: here,
+            self._told,
         )
         self._client = httpx.AsyncClient(
             transport=httpx.ASGITransport(app=create_app(self)), base_url="http://localhost"
@@ -196,23 +205,23 @@ class OpenDoor:
     def _told(self, observation: Observation, arrived: float) -> None:
         check(self.search.belief)
 
-    def state(self) -> dict[str, Any]:
+    async def state(self) -> dict[str, Any]:
         return {"state": "SEARCHING"}
 
-    def map(self) -> dict[str, Any]:
-        return {}
+    async def map(self) -> bytes:
+        return b"{}"
 
-    def picture(self) -> Callable[[], bytes]:
-        return bytes
+    async def picture(self) -> bytes:
+        return b""
 
-    def ready(self) -> bool:
+    async def ready(self) -> bool:
         return True
 
     async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
         return await self.intake.submit_all(reports)
 
-    async def order(self, command: str) -> str:
-        return "HOLDING"
+    async def order(self, command: str) -> OrderReceipt:
+        return OrderReceipt(state="HOLDING")
 
     def post(self, path: str, body: bytes, headers: dict[str, str] | None = None) -> httpx.Response:
         """Post bytes; an exception of the application is raised here."""

@@ -21,6 +21,8 @@ from tests.integration.flight import FIELD, running, service_words, write_area
 SPEEDUP = 10.0
 TARGET = "47.0508,8.3017"
 SETTINGS = """
+[run]
+next_sortie_within_s = {sortie_within_s}
 [flight]
 altitude_m = 15
 settle_s = {settle_s}
@@ -28,6 +30,7 @@ margin_m = {margin_m}
 [sensor]
 cell_m = 20
 p_tn = 0.99
+silent_after_s = {silent_after_s}
 """
 
 
@@ -58,15 +61,17 @@ class Scene:
         """All transitions so far."""
         return list(read_rows(self.journal, "transition"))
 
-    def reaches(self, state: str, reason: str = "", patience_s: float = 90.0) -> Row:
-        """Wait for the next transition into a state, whose reason has these words."""
+    def reaches(self, state: str, *reasons: str, patience_s: float = 90.0) -> Row:
+        """Wait for the next transition into a state, whose reason has one of these words; which one of two true ones
+        comes first may be a matter of which message does."""
         deadline = time.monotonic() + patience_s
         while True:
             over = time.monotonic() > deadline or self.service.process.poll() is not None
             for row in self.transitions():
                 if row.seq > self._seen and row.body["to"] == state:
                     self._seen = row.seq
-                    assert reason in row.body["reason"], row.body
+                    said = row.body["reason"]
+                    assert not reasons or any(words in said for words in reasons), row.body
                     return row
             assert not over, f"no transition to {state} in:\n{self.service.said}"
             time.sleep(0.05)
@@ -102,7 +107,8 @@ class Scene:
         """Let vehicle time pass, in which nothing that moves the aircraft may be sent."""
         before = len(self.tap.motions)
         self.fly(seconds)
-        assert self.tap.motions[before:] == [], self.service.said
+        moved = self.tap.motions[before:]
+        assert moved == [], f"{moved}\n{self.service.said}"
 
     def moves_again(self, patience_s: float = 60.0) -> None:
         """Wait until another waypoint is sent."""
@@ -132,6 +138,8 @@ def flight(
     speedup: float = SPEEDUP,
     settle_s: float = 3.0,
     margin_m: float = 30.0,
+    silent_after_s: float = 10.0,
+    sortie_within_s: float = 0.0,
     module: str = "service",
     target: str | None = None,
     options: tuple[str, ...] = (),
@@ -144,7 +152,8 @@ def flight(
         control = stack.enter_context(Control(autopilot.control))
         tap = stack.enter_context(Tap(autopilot.port))
         file = folder / "settings.toml"
-        file.write_text(SETTINGS.format(settle_s=settle_s, margin_m=margin_m), encoding="utf-8")
+        told = {"settle_s": settle_s, "margin_m": margin_m, "sortie_within_s": sortie_within_s}
+        file.write_text(SETTINGS.format(**told, silent_after_s=silent_after_s), encoding="utf-8")
         area = write_area(folder, FIELD if target else plain(FIELD))
         runs = folder / "runs"
         words = service_words(area, runs, "--connect", tap.url, "--takeoff", "--config", str(file))

@@ -7,7 +7,9 @@ import time
 from types import FrameType
 
 from service.cli import main
-from service.mission.mission import Mission
+from service.mission.core import MissionCore
+from service.mission.effects import Effect
+from service.mission.situation import Situation
 
 STALL_S = 5.0
 
@@ -21,10 +23,10 @@ def stand_still(number: int, frame: FrameType | None) -> None:
 def go_wrong(number: int, frame: FrameType | None) -> None:
     """From now on the mission runs into a mistake that nobody has thought of."""
 
-    async def steer(self: Mission) -> None:
+    def tick(self: MissionCore, seen: Situation, now: float) -> list[Effect]:
         raise ZeroDivisionError("a mistake")
 
-    Mission._steer = steer  # type: ignore[method-assign]
+    MissionCore.tick = tick  # type: ignore[method-assign]
 
 
 if __name__ == "__main__":

@@ -23,7 +23,8 @@ frames = iter({frames})
 def look_at_next_frame():
     time.sleep(0.2)
     try:
-        return time.time() - next(frames), [(47.0508, 8.3017, 0.9)]
+        ago = next(frames)
+        return time.time() - ago, [(47.0508, 8.3017, 0.9)] if ago > 100.0 else []
     except StopIteration:
         raise SystemExit(0)
 """

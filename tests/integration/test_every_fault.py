@@ -7,6 +7,13 @@ from pathlib import Path
 
 from sim.autopilot.fault_kinds import KINDS
 
+DOUBTFUL = "test_what_is_told_no_longer_or_cannot_be_holds_the_search_until_it_passes"
+HARMLESS = "test_what_says_nothing_about_the_flight_does_not_touch_it"
+HEIGHT = "test_the_height_over_the_ground_stays_when_what_it_is_counted_from_moves"
+TAKEN = "test_who_takes_the_aircraft_has_it_until_an_operator_resumes"
+BATTERY = "test_a_battery_that_is_low_or_not_told_leads_home"
+LACKS = "test_what_a_vehicle_lacks_is_said_before_the_ground_is_left"
+
 ANSWERS: dict[str, tuple[str, ...]] = {
     "link_lost": ("test_a_silent_autopilot_is_waited_for_and_nothing_is_sent_blindly",),
     "packets": ("test_a_bad_radio_does_not_keep_the_search_from_its_target",),
@@ -41,21 +48,58 @@ ANSWERS: dict[str, tuple[str, ...]] = {
     "second_autopilot": ("test_other_voices_on_the_link_change_nothing",),
     "gcs_heartbeat": ("test_other_voices_on_the_link_change_nothing",),
     "camera_heartbeat": ("test_other_voices_on_the_link_change_nothing",),
+    "one_way": (DOUBTFUL, LACKS),
+    "mavlink1": ("test_a_vehicle_of_the_old_protocol_is_flown",),
+    "stream_stops": (DOUBTFUL,),
+    "stream_freezes": (DOUBTFUL, HARMLESS),
+    "no_message": (LACKS,),
+    "field": (DOUBTFUL, HARMLESS),
+    "field_shifts": (DOUBTFUL,),
+    "home_datum": (DOUBTFUL,),
+    "battery_unknown": (BATTERY,),
+    "battery_drains": (BATTERY,),
+    "second_battery": (BATTERY,),
+    "command_refused": (LACKS,),
+    "arming_refused": ("test_arming_that_is_refused_for_a_while_is_tried_again",),
+    "amsl_corrected": (HEIGHT,),
+    "home_moved": (HEIGHT,),
+    "origin_moved": (HARMLESS,),
+    "distance_sensor": (HARMLESS,),
+    "terrain_report": (HARMLESS,),
+    "second_gps": (HARMLESS,),
+    "second_estimator": (HARMLESS,),
+    "pilot_hold": (TAKEN,),
+    "failsafe_hold": (TAKEN,),
+    "gcs_goes": (TAKEN,),
+    "gcs_altitude": (TAKEN,),
+    "second_service": (TAKEN,),
 }
 
 
 def flights() -> dict[str, set[str]]:
-    """The tests that fly with faults, and the words in quotation marks in each."""
+    """The tests that fly with faults, and the words in quotation marks in each and in the tables that it names."""
     found: dict[str, set[str]] = {}
     for path in Path(__file__).parent.glob("test_faults_*.py"):
-        for part in ast.parse(path.read_text(encoding="utf-8")).body:
+        parts = ast.parse(path.read_text(encoding="utf-8")).body
+        tables = {
+            part.target.id: words_in(part)
+            for part in parts
+            if isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name)
+        }
+        for part in parts:
             if isinstance(part, ast.FunctionDef):
-                found[part.name] = {
-                    word.value
-                    for word in ast.walk(part)
-                    if isinstance(word, ast.Constant) and isinstance(word.value, str)
-                }
+                named = {each.id for each in ast.walk(part) if isinstance(each, ast.Name)}
+                found[part.name] = words_in(part).union(*(tables.get(name, set()) for name in named))
     return found
+
+
+def words_in(part: ast.AST) -> set[str]:
+    """What stands in quotation marks in a part of a file."""
+    return {
+        word.value
+        for word in ast.walk(part)
+        if isinstance(word, ast.Constant) and isinstance(word.value, str)
+    }
 
 
 def test_every_fault_of_the_mock_has_its_flight() -> None:

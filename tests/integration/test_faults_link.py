@@ -21,17 +21,10 @@ def test_a_silent_autopilot_is_waited_for_and_nothing_is_sent_blindly(tmp_path: 
         scene.moves_again()
 
 
-@pytest.mark.parametrize(
-    ("flavor", "trouble"),
-    [
-        ("px4", {"drop": 0.15, "duplicate": 0.1, "corrupt": 0.1}),
-        ("ardupilot", {"drop": 0.1, "reorder": 0.2, "duplicate": 0.2, "delay_s": 0.1}),
-    ],
-)
-def test_a_bad_radio_does_not_keep_the_search_from_its_target(
-    flavor: str, trouble: dict[str, float], tmp_path: Path
-) -> None:
-    with flight(tmp_path, flavor, speedup=3.0, target=TARGET) as scene:
+def test_a_bad_radio_does_not_keep_the_search_from_its_target(tmp_path: Path) -> None:
+    """The other autopilot's flights have such radios in the soak."""
+    trouble = {"drop": 0.1, "corrupt": 0.1, "reorder": 0.2, "duplicate": 0.2, "delay_s": 0.1}
+    with flight(tmp_path, "ardupilot", speedup=5.0, target=TARGET) as scene:
         scene.control.fault("packets", **trouble)
         code, report = scene.ends()
         assert code == 0, scene.service.said
@@ -46,11 +39,8 @@ def test_lost_acknowledgements_do_not_keep_the_search_from_its_target(tmp_path: 
         assert code == 0, scene.service.said
 
 
-@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
-def test_a_waypoint_that_is_accepted_and_not_flown_holds_until_an_operator_resumes(
-    flavor: str, tmp_path: Path
-) -> None:
-    with flight(tmp_path, flavor) as scene:
+def test_a_waypoint_that_is_accepted_and_not_flown_holds_until_an_operator_resumes(tmp_path: Path) -> None:
+    with flight(tmp_path, "px4") as scene:
         scene.searching()
         scene.control.fault("not_flown")
         scene.reaches("HOLDING", "waypoint")  # not taken over, or no progress towards it
@@ -68,7 +58,9 @@ def test_a_frozen_autopilot_that_still_heartbeats_is_not_steered(tmp_path: Path)
     with flight(tmp_path) as scene:
         scene.searching()
         scene.control.fault("frozen", seconds=60.0)
-        scene.reaches("HOLDING", "no new position")
+        reason = scene.reaches("HOLDING").body["reason"]  # for whichever of its streams is old first
+        assert "no new position" in reason or "any longer" in reason, reason
+        scene.fly(9.0)  # it is told to brake, a few times, as it does not answer
         scene.sends_nothing(15.0)
         scene.reaches("SEARCHING", "the position is good again")
         scene.moves_again()

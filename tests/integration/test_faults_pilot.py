@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from service.mavlink.modes import mode_title
 from tests.integration.scene import Scene, flight
 
 pytestmark = pytest.mark.timeout(300)
@@ -30,7 +31,7 @@ def test_a_pilots_mode_change_stops_all_motion_until_an_operator_resumes(flavor:
         scene.fly(20.0)
         quiet_within_a_second_of(scene, began)
         assert scene.state() == "YIELDED"
-        assert scene.control.state()["mode"] in row.body["reason"]
+        assert mode_title(scene.control.state()["mode"]) in row.body["reason"]
         assert any(text.startswith("search YIELDED") for text in scene.tap.texts)
         scene.control.clear("pilot")
         assert scene.order("resume") == "SEARCHING"
@@ -42,7 +43,7 @@ def test_a_pilots_sticks_stop_all_motion(tmp_path: Path) -> None:
         scene.searching()
         scene.control.fault("pilot", mode="keep", pitch=0.8)
         began = time.monotonic()
-        scene.reaches("YIELDED", "POSCTL")
+        scene.reaches("YIELDED", "Position")
         scene.fly(15.0)
         quiet_within_a_second_of(scene, began)
 
@@ -62,12 +63,11 @@ def test_a_pilot_who_stops_the_climb_is_not_an_error(tmp_path: Path) -> None:
         scene.moves_again()
 
 
-@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
 @pytest.mark.parametrize(
-    ("kind", "options", "words"),
+    ("flavor", "kind", "options", "words"),
     [
-        ("failsafe", {"text": "Critical battery failsafe"}, "Critical battery failsafe"),
-        ("fence_breach", {}, "fence"),
+        ("ardupilot", "failsafe", {"text": "Critical battery failsafe"}, "Critical battery failsafe"),
+        ("px4", "fence_breach", {}, "fence"),
     ],
 )
 def test_the_autopilots_own_return_is_left_alone_and_ends_the_run(
@@ -76,7 +76,7 @@ def test_the_autopilots_own_return_is_left_alone_and_ends_the_run(
     with flight(tmp_path, flavor) as scene:
         scene.searching()
         scene.control.fault(kind, **options)
-        scene.reaches("YIELDED", "RTL")
+        scene.reaches("YIELDED", "RTL", "Return", "the autopilot's failsafe sends the aircraft")
         motions = len(scene.tap.motions)
         code, report = scene.ends()
         assert scene.tap.motions[motions:] == []
@@ -85,9 +85,8 @@ def test_the_autopilots_own_return_is_left_alone_and_ends_the_run(
     assert words in report["stopped_because"]
 
 
-@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
-def test_a_reboot_in_flight_is_told_and_answered_by_nothing_that_moves(flavor: str, tmp_path: Path) -> None:
-    with flight(tmp_path, flavor) as scene:
+def test_a_reboot_in_flight_is_told_and_answered_by_nothing_that_moves(tmp_path: Path) -> None:
+    with flight(tmp_path, "ardupilot") as scene:
         scene.searching()
         scene.control.fault("reboot")
         scene.reaches("YIELDED")

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import httpx
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.area import build_grid, read_area
 from service.journal import Journal
+from sim.autopilot import faults
+from sim.detector import Detector
 from sim.soak import ground
-from sim.soak.audit import audit
-from sim.soak.flight import _grown
-from sim.soak.judge import Judge
-from sim.soak.plan import KINDS, draw_plan
+from sim.soak.audit import Target, audit
+from sim.soak.clocked import CLOCK_FILE, SteppedClock
+from sim.soak.eyes import Eyes, grown, misplaced
+from sim.soak.kinds import AT_BOOT, KINDS
+from sim.soak.plan import draw_plan
 from tests.integration.flight import REPOSITORY
 
 pytestmark = pytest.mark.timeout(400)
-PX4_HOLD, PX4_POSCTL = 4 << 16 | 3 << 24, 3 << 16
 
 
 def test_a_short_soak_ends_without_a_violation() -> None:
-    words = ["soak", "--flights", "2", "--seed", "1", "--faults", "4", "--jobs", "2"]
+    words = ["soak", "--flights", "2", "--seed", "2", "--faults", "4", "--jobs", "2"]
     done = subprocess.run(
         [sys.executable, "-m", "sim", *words, "--verbose"], cwd=REPOSITORY, capture_output=True, text=True
     )
@@ -36,122 +38,152 @@ def test_a_short_soak_ends_without_a_violation() -> None:
 
 
 def test_a_seed_is_a_flight_and_every_kind_of_fault_comes() -> None:
-    plans = [draw_plan(seed, ground.BOUNDS, 12) for seed in range(60)]
-    assert plans == [draw_plan(seed, ground.BOUNDS, 12) for seed in range(60)]
+    plans = [draw_plan(seed, ground.BOUNDS, 12) for seed in range(100)]
+    again = [draw_plan(seed, ground.BOUNDS, 12) for seed in range(100)]
+    assert str(plans) == str(again)  # nan is not nan
     assert {fault.kind for plan in plans for fault in plan.faults} == set(KINDS)
+    assert {plan.at_boot for plan in plans} == set(AT_BOOT)
+    for plan in plans:
+        if any(fault.kind == "detector_lies" for fault in plan.faults):
+            assert plan.target is not None
 
 
-# ---- the judge on the wire
+def test_what_is_drawn_can_be_said() -> None:
+    (only,) = {f.kind for f in draw_plan(1, ground.BOUNDS, 5, frozenset({"gcs_goes"})).faults}
+    assert only == "gcs_goes"
 
 
-class Wire:
-    """Frames for a judge, who has seen the search begin."""
-
-    def __init__(self) -> None:
-        self.judge = Judge("px4", 10.0)
-        self.mode(PX4_HOLD)
-        self.at(200.0, 50.0)
-        self.state("SEARCHING")
-
-    def state(self, name: str) -> None:
-        text = f"search {name}: for a test"
-        self.judge.from_service(_from_us(mavlink.MAVLink_statustext_message(6, text.encode())), self.now)
-
-    @property
-    def now(self) -> float:
-        return time.monotonic()
-
-    def mode(self, custom_mode: int, ago_s: float = 0.0) -> None:
-        message = mavlink.MAVLink_heartbeat_message(2, 12, 209, custom_mode, 4, 3)
-        self.judge.from_autopilot(_from_autopilot(message), self.now - ago_s)
-
-    def at(self, east: float, north: float) -> None:
-        lon, lat = ground._ring([(east, north)])[0]
-        message = mavlink.MAVLink_global_position_int_message(
-            1, round(lat * 1e7), round(lon * 1e7), 415000, 15000, 0, 0, 0, 0
-        )
-        self.judge.from_autopilot(_from_autopilot(message), self.now)
-
-    def goes(self, east: float, north: float, height: float = 15.0, param2: float = 0.0) -> list[str]:
-        """Send the aircraft there; what the judge says."""
-        lon, lat = ground._ring([(east, north)])[0]
-        amsl = ground.GROUND_AMSL_M + height
-        message = mavlink.MAVLink_command_int_message(
-            1, 1, 0, 192, 0, 0, -1.0, param2, 0.0, 0.0, round(lat * 1e7), round(lon * 1e7), amsl
-        )
-        before = len(self.judge.violations)
-        self.judge.from_service(_from_us(message), self.now)
-        return self.judge.violations[before:]
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_every_draw_of_a_fault_of_the_mock_is_one_that_it_takes(kind: str) -> None:
+    name = {"pilot_sticks": "pilot", "dead_reckoning": "gps_lost"}.get(kind, kind)
+    for seed in range(30):
+        (fault,) = draw_plan(seed, ground.BOUNDS, 1, frozenset({kind})).faults
+        if name in faults.KINDS:
+            faults.Fault.of({"kind": name, **fault.options})
 
 
-def _from_autopilot(message: Any) -> Any:
-    return _decoded(message, 1, 1)
+def test_what_is_so_from_the_start_is_what_the_mock_takes() -> None:
+    for name, table in AT_BOOT.items():
+        if name != "none":
+            faults.Fault.of(table)
 
 
-def _from_us(message: Any) -> Any:
-    return _decoded(message, 1, 191)
+# ---- what is done to the detector and to the clock
 
 
-def _decoded(message: Any, system: int, component: int) -> Any:
-    writer = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
-    (decoded,) = mavlink.MAVLink(None).parse_buffer(message.pack(writer))
-    return decoded
+def test_a_detector_that_lies_says_another_place() -> None:
+    seen = {"lat": 47.0, "lon": 8.0}
+    assert misplaced("swapped", seen) == {"lat": 8.0, "lon": 47.0}
+    assert misplaced("nowhere", seen) == {"lat": 0.0, "lon": 0.0}
+    assert misplaced("far", seen)["lat"] > 47.008
+    assert misplaced("", seen) == seen
 
 
-def test_the_judge_lets_a_search_be() -> None:
-    wire = Wire()
-    assert wire.goes(220.0, 50.0) == []
-    wire.state("HOLDING")
-    assert wire.goes(205.0, 50.0) == wire.goes(205.0, 50.0) == []
-    wire.state("RETURNING")
-    assert wire.goes(-10.0, 50.0) != []  # straight through the pond
-    assert wire.goes(130.0, 20.0) == []
+STATE = {
+    "pose": {"time": 1000.0},
+    "footprint": {
+        "p_tp": 0.9,
+        "p_tn": 0.97,
+        "cells": [
+            {
+                **{"row": 0, "col": col, "counts": True, "p_tp": 0.9, "p_tn": 0.97},
+                **{"lat": 47.0, "lon": 8.0 + col, "corners": corners},
+            }
+            for col, corners in enumerate(
+                [[[46.9, east], [46.9, east + 1], [47.1, east + 1], [47.1, east]] for east in (7.5, 8.5)]
+            )
+        ],
+    },
+}
+"""What the door tells of a frame over two cells, of which the first has the target."""
 
 
-@pytest.mark.parametrize("state", ["READY", "TAKEOFF", "YIELDED", "DONE"])
-def test_the_judge_sees_motion_in_a_state_that_may_not_move(state: str) -> None:
-    wire = Wire()
-    wire.state(state)
-    (said,) = wire.goes(220.0, 50.0)
-    assert "not in this state" in said
+def reported(sees: bool, way: str = "", off_s: float = 0.0, *, own_clock: bool = False) -> tuple[Eyes, Any]:
+    """The detector of the soak after one frame, and what the door got; it sees the target, or what is none."""
+    got: list[Any] = []
+
+    def door(request: httpx.Request) -> httpx.Response:
+        if request.method == "GET":
+            return httpx.Response(200, json=STATE)
+        got.append(json.loads(request.content))
+        return httpx.Response(200, json=[{"status": "accepted", "id": got[-1]["id"]}])
+
+    detector = Detector((47.0, 8.0), 1.0 if sees else 0.0, 1.0, 1)
+    eyes = Eyes("http://door", 0, detector, 1.0, own_clock=own_clock)
+    eyes.lies, eyes.clock_off_s = way, off_s
+    with httpx.Client(base_url="http://door", transport=httpx.MockTransport(door)) as client:
+        eyes._frame(client, None)  # one frame of its thread, which goes on until it is told to stop
+    return eyes, got[0]
 
 
-@pytest.mark.parametrize(
-    ("there", "words"),
-    [
-        ((320.0, 50.0), "outside the area"),
-        ((40.0, 50.0), "crosses the pond"),
-        ((220.0, 50.0, 45.0), "45.0 m above home"),
-        ((220.0, 50.0, 15.0, 1.0), "may change the mode"),
-    ],
-)
-def test_the_judge_sees_a_waypoint_outside_the_limits(there: tuple[float, ...], words: str) -> None:
-    (said,) = Wire().goes(*there)
-    assert words in said
+@pytest.mark.parametrize("way", ["", "swapped", "nowhere", "far"])
+def test_the_judge_knows_that_the_target_was_seen_wherever_a_liar_says_it_was(way: str) -> None:
+    eyes, got = reported(True, way)
+    assert eyes.true_hits == eyes.acknowledged == {got["id"]}
+    (said,) = got["detections"]
+    assert ((said["lat"], said["lon"]) == (47.0, 8.0)) == (way == "")
+    eyes, got = reported(False, way)
+    assert (eyes.true_hits, eyes.acknowledged, got["detections"]) == (set(), {got["id"]}, [])
 
 
-def test_the_judge_sees_a_second_stop_and_one_that_is_none() -> None:
-    wire = Wire()
-    wire.state("HOLDING")
-    assert wire.goes(205.0, 50.0) == []
-    assert "a second stop" in wire.goes(215.0, 50.0)[0]
-    wire.state("SEARCHING")
-    wire.state("HOLDING")
-    assert "a stop far away" in wire.goes(20.0, 10.0)[0]
+@pytest.mark.parametrize("way", ["swapped", "nowhere", "far"])
+def test_a_lie_that_is_taken_for_a_look_in_vain_is_seen_in_the_journal(way: str, tmp_path: Path) -> None:
+    area = tmp_path / "area.geojson"
+    area.write_text(json.dumps(ground.area()), encoding="utf-8")
+    grid = build_grid(read_area(area), ground.CELL_M)
+    row, col = (int(number) for number in grid.start)
+    (place,) = grid.frame.to_latlon([(row, col)])
+    eyes, got = reported(True, way)
+    journal = Journal(tmp_path / "journal.sqlite")
+    look = {"cells": [[row, col]], "hits": [False], "p_tp": [0.9], "p_tn": [0.9], "first": [True]}
+    journal.write(0.0, "report", {"report": {"id": got["id"]}, "pose": POSE, "observation": look}).result()
+    target = Target((float(place[0]), float(place[1])), frozenset(eyes.true_hits))
+    (said,) = audit(tmp_path, eyes.acknowledged, [], target)
+    assert "saw the target, and lowered its cell from " in said
+    journal.close()
 
 
-def test_the_judge_sees_motion_against_the_pilot() -> None:
-    wire = Wire()
-    wire.mode(PX4_POSCTL, ago_s=5.0)
-    said = wire.goes(220.0, 50.0)
-    assert any("the pilot has had the aircraft" in each for each in said)
-    wire.mode(PX4_HOLD)
-    assert any("the pilot has had the aircraft" in each for each in wire.goes(220.0, 50.0))
-    wire.judge.ordered(wire.now)
-    assert wire.goes(220.0, 50.0) == []
+def test_only_a_detector_that_goes_by_the_computers_clock_steps_with_it() -> None:
+    _, got = reported(True, off_s=90.0)
+    assert (got["captured_at"], got["clock"]) == (1000.0, "service")
+    _, got = reported(True, off_s=90.0, own_clock=True)
+    assert (got["captured_at"], "clock" in got) == (1090.0, False)
+
+
+def test_the_clock_of_a_process_and_of_its_children_steps(tmp_path: Path) -> None:
+    clock = SteppedClock(tmp_path / "clock")
+    clock.step(1000.0)
+    clock.step(-100.0)
+    words = "import sim.soak.clocked as c, time, os; from pathlib import Path; before = time.time(); "
+    words += f"c.follow(Path(os.environ['{CLOCK_FILE}'])); print(time.time() - before)"
+    done = subprocess.run(
+        [sys.executable, "-c", words], cwd=REPOSITORY, capture_output=True, text=True,
+        env={**os.environ, CLOCK_FILE: str(clock.path)},
+    )  # fmt: skip
+    assert float(done.stdout) == pytest.approx(900.0, abs=5.0)
 
 
 # ---- the judge over the journal
+
+
+POSE = [47.0, 8.0, 30.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("yielded", "row 1 is no yielded that this version knows (it has no reason)"),
+        ("tea", "row 1 is of a kind that nobody reads: tea"),
+    ],
+)
+def test_the_audit_sees_a_row_that_the_service_could_not_go_on_from(
+    kind: str, words: str, tmp_path: Path
+) -> None:
+    (tmp_path / "area.geojson").write_text(json.dumps(ground.area()), encoding="utf-8")
+    journal = Journal(tmp_path / "journal.sqlite")
+    journal.write(0.0, kind, {}).result()
+    assert audit(tmp_path, set(), [])[0].endswith(words)
+    journal.close()
 
 
 def test_the_audit_sees_what_is_lost_doubled_or_does_not_add_up(tmp_path: Path) -> None:
@@ -162,10 +194,10 @@ def test_the_audit_sees_what_is_lost_doubled_or_does_not_add_up(tmp_path: Path) 
     journal = Journal(tmp_path / "journal.sqlite")
     look = {"cells": [[row, col]], "hits": [False], "p_tp": [0.9], "p_tn": [0.9], "first": [True]}
     bodies: list[tuple[str, dict[str, Any]]] = [
-        ("transition", {"from": "WAITING", "to": "READY"}),
-        ("transition", {"from": "READY", "to": "SEARCHING"}),
+        ("transition", {"from": "WAITING", "event": "linked", "to": "READY", "reason": ""}),
+        ("transition", {"from": "READY", "event": "airborne", "to": "SEARCHING", "reason": ""}),
         ("command", {"command": "reposition"}),
-        ("report", {"report": {"id": "a"}, "observation": look}),
+        ("report", {"report": {"id": "a"}, "pose": POSE, "observation": look}),
     ]
     for kind, body in bodies:
         journal.write(0.0, kind, body).result()
@@ -174,10 +206,10 @@ def test_the_audit_sees_what_is_lost_doubled_or_does_not_add_up(tmp_path: Path) 
     assert "is not the one that the journal adds up to" in audit(tmp_path, {"a"}, [(1, "another")])[0]
     assert "2 reports were told, 1 are in the journal" in audit(tmp_path, {"a"}, [(2, "another")])[0]
     bodies = [
-        ("report", {"report": {"id": "a"}, "observation": None}),
-        ("transition", {"from": "SEARCHING", "to": "YIELDED"}),
+        ("report", {"report": {"id": "a"}, "pose": POSE, "observation": None}),
+        ("transition", {"from": "SEARCHING", "event": "pilot", "to": "YIELDED", "reason": ""}),
         ("command", {"command": "reposition"}),
-        ("transition", {"from": "HOLDING", "to": "SEARCHING"}),
+        ("transition", {"from": "HOLDING", "event": "resume", "to": "SEARCHING", "reason": ""}),
     ]
     for kind, body in bodies:
         journal.write(0.0, kind, body).result()
@@ -185,8 +217,41 @@ def test_the_audit_sees_what_is_lost_doubled_or_does_not_add_up(tmp_path: Path) 
     assert "1 reports are in the journal twice" in found
     assert "row 7: a waypoint in YIELDED" in found
     assert "row 8: a transition from HOLDING in YIELDED" in found
+    # what tampers with a file has no door; the journal holds it open and locked
     journal._database.execute("DELETE FROM events WHERE seq = 3")
     assert "rows are missing" in audit(tmp_path, {"a"}, [])[0]
+    journal.close()
+
+
+def test_the_audit_lets_a_run_stop_the_aircraft_that_it_gives_up(tmp_path: Path) -> None:
+    (tmp_path / "area.geojson").write_text(json.dumps(ground.area()), encoding="utf-8")
+    journal = Journal(tmp_path / "journal.sqlite")
+
+    def write(kind: str, **body: Any) -> None:
+        journal.write(0.0, kind, body).result()
+
+    write("transition", **{"from": "WAITING", "event": "climb", "to": "TAKEOFF", "reason": ""})
+    write("command", command="hold")
+    write("transition", **{"from": "TAKEOFF", "event": "abort", "to": "ABORTED", "reason": ""})
+    assert audit(tmp_path, set(), []) == []
+    write("command", command="hold")
+    assert audit(tmp_path, set(), []) == ["row 4: stop 1 in ABORTED"]
+    journal.close()
+
+
+def test_the_audit_sees_a_true_detection_that_lowered_its_own_cell(tmp_path: Path) -> None:
+    area = tmp_path / "area.geojson"
+    area.write_text(json.dumps(ground.area()), encoding="utf-8")
+    grid = build_grid(read_area(area), ground.CELL_M)
+    row, col = (int(number) for number in grid.start)
+    (place,) = grid.frame.to_latlon([(row, col)])
+    journal = Journal(tmp_path / "journal.sqlite")
+    for name, hit in (("good", True), ("half-used", False), ("other", False)):
+        look = {"cells": [[row, col]], "hits": [hit], "p_tp": [0.9], "p_tn": [0.9], "first": [True]}
+        journal.write(0.0, "report", {"report": {"id": name}, "pose": POSE, "observation": look}).result()
+    target = Target((float(place[0]), float(place[1])), frozenset({"good", "half-used"}))
+    (said,) = audit(tmp_path, {"good", "half-used", "other"}, [], target)
+    assert "row 2: report half-used saw the target, and lowered its cell from " in said
     journal.close()
 
 
@@ -204,5 +269,5 @@ def test_the_audit_sees_what_is_lost_doubled_or_does_not_add_up(tmp_path: Path) 
     ],
 )
 def test_growth_is_seen(memory: list[float], tasks: list[int], words: str) -> None:
-    eyes: Any = SimpleNamespace(memory_mb=memory, tasks=tasks)
-    assert "; ".join(_grown(eyes)) == words
+    eyes: Any = SimpleNamespace(memory_mb=memory, tasks=tasks, aircraft="")
+    assert "; ".join(grown(eyes)) == words

@@ -78,3 +78,26 @@ def greedy_value(
     reached = {c: n for c, n in distances(start, flyable).items() if 0 < n <= horizon}
     best = max(float(prior[cell]) for cell in reached)
     return best, min(steps for cell, steps in reached.items() if prior[cell] == best)
+
+
+def walked(
+    p: NDArray[np.float64], into: NDArray[np.float64], stops: float, ticks: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Who walks and who has stopped after some ticks, if all of `p` walk at first: the chain's whole matrix, squared.
+
+    `into` [rows, cols]: the chance to step into a cell from each neighbour; zero closes it.
+    """
+    size, cols = p.size, p.shape[1]
+    matrix = np.eye(size)
+    for a in range(size):
+        for b in range(size):
+            beside = abs(a // cols - b // cols) + abs(a % cols - b % cols) == 1
+            if beside and into.flat[a] > 0.0 and into.flat[b] > 0.0:
+                matrix[a, b] += into.flat[b]
+                matrix[a, a] -= into.flat[b]
+    walks, stopped = p.ravel().copy(), np.zeros(size)
+    for _ in range(ticks):
+        walks = walks @ matrix
+        stopped += stops * walks
+        walks = (1.0 - stops) * walks
+    return walks.reshape(p.shape), stopped.reshape(p.shape)

@@ -49,18 +49,6 @@ def test_the_same_looks_in_the_same_order_give_the_same_bits(seen: list) -> None
     assert first.total == second.total
 
 
-@given(st.lists(looks, max_size=30))
-@settings(max_examples=30, deadline=None)
-def test_a_belief_survives_bytes_bit_for_bit_and_goes_on_the_same(seen: list) -> None:
-    belief = observed(Belief(PRIOR, outside=0.2), seen)
-    again = Belief.from_bytes(belief.to_bytes())
-    assert again.digest() == belief.digest()
-    assert again.total == belief.total
-    for one in (belief, again):
-        one.observe([(1, 1), (2, 2)], [True, False], 0.8, 0.7)
-    assert again.digest() == belief.digest()
-
-
 def test_one_observation_of_many_cells_equals_many_of_one() -> None:
     together, apart = Belief(PRIOR), Belief(PRIOR)
     together.observe([(0, 0), (1, 2), (2, 3)], [False, True, False], [0.9, 0.8, 0.7], [0.6, 0.9, 0.95])
@@ -149,49 +137,3 @@ def test_a_copy_is_independent() -> None:
 
 def test_entropy_of_a_uniform_belief_is_the_logarithm_of_its_cells() -> None:
     assert Belief(np.ones((8, 8))).entropy() == pytest.approx(6.0)
-
-
-@pytest.mark.parametrize("data", [b"", b"nonsense", Belief(PRIOR).to_bytes()[:-1]])
-def test_damaged_bytes_are_refused(data: bytes) -> None:
-    with pytest.raises(ValueError, match="bytes"):
-        Belief.from_bytes(data)
-
-
-@pytest.mark.parametrize(
-    ("looks", "p_tn", "pairs"),
-    [
-        ([], 0.9, 0),
-        ([False, False, False], 0.9, 0),
-        ([True], 0.9, 0),
-        ([True, False], 0.9, 1),
-        ([False, True], 0.9, 1),
-        ([True, False, True], 0.9, 0),  # the hits outweigh the miss
-        ([True, False, True, False], 0.9, 2),
-        ([True, False, False], 0.9, 1),
-        ([True, False], 0.98, 0),  # a hit of this detector says more than a miss
-        ([True, False, False], 0.98, 1),
-    ],
-)
-def test_contradicted_are_hits_that_misses_outweigh(looks: list[bool], p_tn: float, pairs: int) -> None:
-    belief = Belief(np.ones((2, 3)))
-    for hit in looks:
-        belief.observe([(1, 1)], hit, 0.9, p_tn)
-    assert belief.contradicted(np.array([0, 4])).tolist() == [0, pairs]
-    thought = belief.copy()
-    thought.observe([(1, 1), (0, 0)], False, 0.9, p_tn)  # what is only expected stays with the copy
-    assert thought.contradicted(np.array([0])).tolist() == [0]
-    assert belief.contradicted(np.array([0, 4])).tolist() == [0, pairs]
-
-
-def test_contradicted_outlasts_rescaling_and_a_refused_observation() -> None:
-    belief = Belief(np.ones((1, 2)))
-    for hit in (True, False):
-        belief.observe([(0, 1)], hit, 0.9, 0.9)
-    for _ in range(700):
-        belief.observe([(0, 0), (0, 1)], True, 0.9, 0.3)
-    for _ in range(700):
-        belief.observe([(0, 0), (0, 1)], False, 1.0 - 0.7 / 0.9 * 0.3, 0.3)
-    with pytest.raises(ValueError, match="explain"):
-        belief.observe([(0, 0), (0, 1)], False, 1.0, 0.9)
-    hits = belief.contradicted(np.array([0, 1]))
-    assert hits[1] == hits[0] + 1

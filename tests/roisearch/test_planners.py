@@ -140,6 +140,8 @@ def test_a_drone_that_cannot_be_there_is_an_error_with_its_cell(cell: tuple[int,
         ("best", {}, "no planner 'best'"),
         ("puct", {"speed": 1}, "no option 'speed'"),
         ("puct", {"preset": "fast"}, "preset"),
+        ("puct-regions-lite", {"preset": "trips"}, "default, paper, reference"),
+        ("puct-regions-lite", {"rollout": 60}, "no option 'rollout'; it has .* preset='paper'"),
         ("puct", {"backup": "median"}, "backup is one of mean, max"),
         ("index", {"speed": 1}, "speed"),
         ("greedy", {"horizon": 0}, "horizon"),
@@ -197,13 +199,11 @@ def test_no_planner_beats_the_bound(name: str, fov: FieldOfView) -> None:
     assert (np.array(found) <= bound + 1e-12).all()
 
 
-@pytest.mark.parametrize("name", ["puct-regions-lite", "index"])
+@pytest.mark.parametrize("name", ["puct-regions", "index"])
 def test_the_path_of_a_far_goal_is_cut_but_the_goal_is_told(name: str) -> None:
     prior = np.full((5, 300), 1e-12)
     prior[2, 290] = 1.0
-    planner = make_planner(
-        name, fov=FieldOfView.point(), **({} if name == "index" else {"preset": "trips", "prior": "index"})
-    )
+    planner = make_planner(name, fov=FieldOfView.point(), **({} if name == "index" else {"prior": "index"}))
     decision = planner.plan(Belief(prior), SearchState((2, 3)), np.random.default_rng(0))
     assert decision.goal == (2, 290)
     assert decision.path == tuple((2, col) for col in range(4, 4 + AHEAD))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from scipy import ndimage
 
 from roisearch import Belief, FieldOfView, segment_regions
 from roisearch.forest import Forest
@@ -78,7 +79,7 @@ def test_region_sums_and_peaks_follow_every_observation(world: World) -> None:
     regions = segment_regions(world.prior)
     belief = Belief(world.prior)
     forest = Forest(regions.labels, regions.count + 1)
-    sums = belief.sums_of(forest)
+    sums = belief.follow(forest)
     rng = np.random.default_rng(0)
     for _ in range(10):
         cells = rng.integers(0, world.prior.shape, (3, 2))
@@ -89,3 +90,21 @@ def test_region_sums_and_peaks_follow_every_observation(world: World) -> None:
         if inside.size:
             assert sums.sums[forest.root[region]] == pytest.approx(inside.sum(), rel=1e-12)
             assert sums.peaks[forest.root[region]] == inside.max()
+
+
+def test_middles_and_peaks_of_regions_are_those_of_their_cells() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        prior = ndimage.gaussian_filter(rng.random((50, 70)), 2.0) ** 8
+        regions = segment_regions(prior, float(prior.mean()))
+        assert regions.count > 2
+        for label in range(1, regions.count + 1):
+            inside = regions.labels == label
+            np.testing.assert_allclose(regions.centroids[label - 1], np.argwhere(inside).mean(axis=0))
+            assert prior[tuple(regions.peaks[label - 1])] == prior[inside].max()
+
+
+def test_the_peak_of_a_flat_top_is_its_first_cell() -> None:
+    prior = np.zeros((12, 12))
+    prior[3:6, 4:8] = 1.0
+    assert segment_regions(prior).peaks.tolist() == [[3, 4]]

@@ -13,7 +13,9 @@ from roisearch.detection import DetectionRecord
 from service.area import GridFrame
 from service.clock import Clock
 from service.evidence.intake import Intake
-from service.evidence.observe import Cell, Observation, Pose, Sensor
+from service.evidence.mask import Sensor
+from service.evidence.moments import Moments
+from service.evidence.observe import FramePose, Observation
 from service.evidence.reports import Detection, Report
 from service.journal import Journal
 
@@ -23,29 +25,31 @@ FRAME = GridFrame(47.05, 8.30, 0.0, 25.0, 20, 30, -375.0, 250.0)
 class Ground:
     """What a journal is retraced on: a belief and a record of looks."""
 
+    aircraft = ""
+
     def __init__(self) -> None:
+        self.believing = asyncio.Lock()
         self.belief = Belief(np.ones(FRAME.shape))
         self.record = DetectionRecord(np.ones(FRAME.shape))
 
-    def apply(self, observation: Observation) -> None:
-        """Update the belief."""
-        self.belief.observe(observation.cells, observation.hits, observation.p_tp, observation.p_tn)
+    def redrawn(self, now: float) -> None:
+        """Its regions stay as they are."""
 
-    def judge(self, cell: Cell, said: Observation, *, confirmed: bool) -> None:
-        """Nobody judges here."""
-        raise NotImplementedError
+    def take(self, said: Observation, time: float | None = None) -> None:
+        """Update the belief; nobody judges here, and there is no news."""
+        self.belief.observe(said.cells, said.hits, said.p_tp, said.p_tn)
 
 
 def intake(path: Path, seed: int) -> Intake:
     """An intake beside an aircraft that is somewhere else at every moment."""
     rng = np.random.default_rng(seed)
 
-    def pose_at(moment: float) -> Pose:
+    def pose_at(moment: float) -> FramePose:
         lat, lon = FRAME.to_latlon([rng.uniform((0, 0), (19, 29)).round()])[0]
-        return Pose(float(lat), float(lon), 30.0, 0.0, moment)
+        return FramePose(float(lat), float(lon), 30.0, 0.0, moment)
 
     sensor = Sensor(FRAME, FieldOfView.point(), 0.9, 0.9, 0.2, 0.8, 30.0)
-    return Intake(Ground(), sensor, Journal(path), Clock(), pose_at, lambda *_: None)  # type: ignore[arg-type]
+    return Intake(Ground(), sensor, Journal(path), Moments(Clock()), pose_at, lambda *_: None)  # type: ignore[arg-type]
 
 
 def report(number: int, captured_at: float) -> Report:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib.metadata
+import importlib.util
+import socket
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from service.cli import main, parser
 from service.commands import COMMANDS
+from sim.__main__ import main as simulate
 
 
 def test_the_help_fits_a_screen_and_names_every_flag_and_command() -> None:
@@ -16,6 +23,7 @@ def test_the_help_fits_a_screen_and_names_every_flag_and_command() -> None:
     lines = said.rstrip("\n").splitlines()
     assert len(lines) <= 24
     assert max(map(len, lines)) <= 80
+    # argparse has no public list of the flags of a parser
     flags = [action.option_strings[-1] for action in parser()._actions if action.dest != "help"]
     assert [flag for flag in flags if flag not in said] == []
     assert [word for word in COMMANDS if f"\n  {word} " not in said] == []
@@ -38,6 +46,15 @@ def test_help_comes_before_anything_heavy_is_imported(word: str) -> None:
     assert "roisearch-service" in said.stdout
 
 
+@pytest.mark.parametrize("program", [main, simulate])
+def test_the_version_is_that_of_the_package(
+    program: Callable[[list[str]], int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with contextlib.suppress(SystemExit):
+        program(["--version"])
+    assert capsys.readouterr().out == f"roisearch {importlib.metadata.version('roisearch')}\n"
+
+
 def test_a_misspelt_command_is_answered_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["confg"]) == 2
     assert "did you mean 'config'?" in capsys.readouterr().err
@@ -48,3 +65,43 @@ def test_a_misspelt_command_is_answered_with_the_nearest(capsys: pytest.CaptureF
 def test_neither_area_nor_run_is_one_clear_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("udpp://1.2.3.4:5", "udpp"),
+        ("udpin://0.0.0.0", "port"),
+        ("serial:///dev/ttyACM0:57600", "pip install 'roisearch[serial]'"),
+    ],
+)
+def test_a_link_that_cannot_be_is_told_before_anything_is_compiled(
+    url: str,
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    real = importlib.util.find_spec
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name, *more: None if name == "serial" else real(name, *more)
+    )
+    arguments = ["--area", "config/area.geojson", "--connect", url, "--runs", str(tmp_path / "runs")]
+    assert main([*arguments, "--http", "127.0.0.1:0"]) == 2
+    said = capsys.readouterr()
+    assert words in said.err
+    assert "compil" not in said.out
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_link_that_may_be_a_real_aircraft_is_warned_of_until_somebody_has_thought_of_the_ground(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:  # so that it ends before it begins
+        door = ["--http", f"127.0.0.1:{taken.getsockname()[1]}"]
+        link = ["--connect", "udpin://127.0.0.1:0", *door, "--runs", str(tmp_path / "runs")]
+        for more, warned in (([], True), (["--flat"], False), (["--speedup", "5"], False)):
+            assert main(["--area", "config/area.geojson", *link, *more]) == 2
+            assert ("give --ground FILE, or --flat" in " ".join(capsys.readouterr().out.split())) == warned
+    assert main(["--area", "config/area.geojson", *link, "--ground", str(tmp_path / "none.tif")]) == 2
+    assert "there is no such height model; check ground.file" in capsys.readouterr().err

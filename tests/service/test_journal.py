@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import gc
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -175,6 +177,7 @@ def test_a_full_disk_is_told_to_the_writer_and_remembered_and_nothing_half_writt
 ) -> None:
     path = tmp_path / "j.sqlite"
     journal = Journal(path)
+    # a full disk, for the one connection that writes
     journal._database.execute("PRAGMA max_page_count = 12")
 
     written = 0
@@ -315,3 +318,21 @@ def test_a_journal_that_may_not_be_read_is_refused_in_a_sentence(
     monkeypatch.setattr(sqlite3, "connect", refuse)
     with pytest.raises(BadInput, match="the journal cannot be read"):
         list(read_rows(path))
+
+
+@pytest.mark.parametrize("how", ["deleted", "its folder moved"])
+def test_a_journal_that_is_deleted_while_it_is_written_is_lost_and_one_that_is_moved_is_not(
+    how: str, tmp_path: Path
+) -> None:
+    (tmp_path / "run").mkdir()
+    with contextlib.closing(Journal(tmp_path / "run" / "journal.sqlite")) as journal:
+        journal.write(1.0, "report", {}).result()
+        if how == "deleted":
+            shutil.rmtree(tmp_path / "run")
+            with pytest.raises(sqlite3.Error, match="its file has been deleted"):
+                journal.write(2.0, "report", {}).result()
+            assert journal.failed is not None
+            return
+        (tmp_path / "run").rename(tmp_path / "there")
+        journal.write(2.0, "report", {}).result()
+    assert len(list(read_rows(tmp_path / "there" / "journal.sqlite"))) == 2

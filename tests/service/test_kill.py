@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from service.entries import read_entries
 from service.journal import read_rows
 from service.resume import replay, retrace
+from service.rows import ReportRow
 from tests.service.reporting import Ground, intake, report, run
 
 KILLS = 8
@@ -54,8 +56,8 @@ def test_a_kill_at_any_instant_loses_nothing_and_counts_nothing_twice(
     assert len(ids) == len(set(ids)) == count
 
     retraced, digests = Ground(), [Ground().belief.digest()]
-    for row in read_rows(path, "report"):
-        retrace(row, retraced)  # type: ignore[arg-type]
+    for entry in read_entries(path, ReportRow):
+        retrace(entry, retraced)  # type: ignore[arg-type]
         digests.append(retraced.belief.digest())
     assert [digests[so_far] for _, so_far, _ in told] == [digest for _, _, digest in told]
     assert digests[-1] == ground.belief.digest()

@@ -76,6 +76,8 @@ def test_the_command_in_the_unit_is_one_that_the_service_takes() -> None:
     assert program == PROGRAM
     options = parser().parse_args(arguments)
     assert options.area is not None
+    assert options.go_on  # a crash is gone on with, and no second search is begun
+    assert not options.takeoff
     assert options.runs == "/var/lib/" + lines("StateDirectory")[0]
 
 

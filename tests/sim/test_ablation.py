@@ -10,10 +10,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from roisearch import FieldOfView
-from roisearch.planners.sweep import SweepPlanner
-from roisearch.planners.sweep_settings import SweepSettings
+from roisearch.planners.lookahead.planner import LookaheadPlanner
+from roisearch.planners.lookahead.settings import LookaheadSettings
 from sim import ablation
-from sim.ruler import detection_curve
+from sim.ruler import Ruler, detection_curve
 
 
 def hills() -> np.ndarray:
@@ -34,9 +34,9 @@ def test_ratio_of_sums_and_mean_of_ratios_with_their_errors() -> None:
 def test_following_an_unthought_path_gives_the_curve_of_planning_at_every_step() -> None:
     fov, curves = FieldOfView.point(0.9, 1.0), []
     for follow in (False, True):
-        planner = SweepPlanner(SweepSettings(iterations=0, horizon=800), fov=fov)
+        planner = LookaheadPlanner(LookaheadSettings(iterations=0, horizon=800), fov=fov)
         rng = np.random.default_rng(0)
-        curves.append(detection_curve(planner, hills(), (2, 2), 0.9, 1500, rng, follow=follow))
+        curves.append(detection_curve(planner, hills(), (2, 2), 1500, Ruler(0.9, follow=follow), rng))
     np.testing.assert_allclose(curves[0], curves[1], atol=1e-12)
     assert curves[0][-1] > 0.9
 

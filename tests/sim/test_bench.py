@@ -29,6 +29,7 @@ def test_the_planner_is_far_faster_than_its_twin() -> None:
 
 
 def test_a_twin_that_decides_otherwise_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    # a twin that errs deep inside: none can be made to by what it is given
     monkeypatch.setattr(bench.TwinPlanner, "_roll_out", lambda self, cell, heading: float(cell[0]))
     with pytest.raises(AssertionError, match="decide differently"):
         bench.against_twin(40, lambda line: None)

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
-from sim.detector import Detector, contains, follow, main
+from sim.detector import Detector, contains, follow, main, of_aircraft
 
 SQUARE = [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
 
@@ -40,6 +45,57 @@ def test_it_raises_false_alarms_as_often_as_it_was_told() -> None:
     assert rate(None, 0.7, 0.8) == pytest.approx(0.2, abs=0.04)
 
 
+def test_a_target_that_walks_is_reported_where_it_is_by_then() -> None:
+    detector = Detector(lambda seconds: (0.4 - seconds, 0.4), 1.0, 1.0, seed=3)
+    before, first, gone = state(0, counts=False), state(0), state(0)
+    before["pose"]["time"], first["pose"]["time"], gone["pose"]["time"] = 50.0, 100.0, 101.0
+    assert not detector.frame(before)["detections"]  # its walk begins at the first look
+    assert detector.frame(first)["detections"][0]["lat"] == 0.4
+    there = state(1)
+    there["pose"]["time"] = 101.0
+    assert detector.frame(there)["detections"][0]["lat"] == pytest.approx(-0.6)
+    assert not detector.frame(gone)["detections"]
+
+
+@pytest.mark.parametrize("text", ["[[0, 47.0]]", "[[5, 47, 8], [1, 47, 8]]", "nothing", "[[0, NaN, 8]]"])
+def test_a_walk_that_is_none_is_refused(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "walk.json"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main(["--service", "http://127.0.0.1:9", "--walk", str(file)])
+    assert str(file) in capsys.readouterr().err
+
+
+def test_an_attached_detector_is_gone_when_whoever_started_it_is_killed(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "sim", "detector", "--service", "http://127.0.0.1:9", "--patience", "600"]
+    code = f"""
+import subprocess, time
+child = subprocess.Popen({[*words, "--attached"]!r}, stdin=subprocess.PIPE, start_new_session=True)
+print(child.pid, flush=True)
+time.sleep(600)
+"""
+    parent = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    child = int(parent.stdout.readline())
+    os.kill(child, 0)
+    parent.kill()
+    parent.wait()
+    deadline = time.monotonic() + 60.0
+    while _runs(child):
+        assert time.monotonic() < deadline, "the detector has outlived who started it"
+        time.sleep(0.05)
+
+
+def _runs(process: int) -> bool:
+    try:
+        stat = Path(f"/proc/{process}/stat").read_text(encoding="ascii")
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[0] != "Z"
+
+
 def test_frames_of_one_pass_repeat_its_verdict() -> None:
     detector = Detector((0.4, 0.4), 0.5, 0.5, seed=1)
     for _ in range(50):
@@ -54,6 +110,7 @@ def test_a_better_view_in_the_same_pass_finds_as_many_as_it_would_alone() -> Non
     for _ in range(2000):
         poor += bool(detector.frame(state(0, p_tp=0.45))["detections"])
         better += bool(detector.frame(state(0))["detections"])
+        # what it remembers of the pass is compared with what it says: it is not to say less than it knows
         assert bool(detector.frame(state(0, p_tp=0.45))["detections"]) == bool(detector._hits)
         detector.frame(state(1))
     assert poor / 2000 == pytest.approx(0.45, abs=0.04)
@@ -73,6 +130,14 @@ def test_a_cell_that_stays_in_view_is_looked_at_anew_after_the_time_that_was_set
 def test_a_frame_between_cells_reports_that_nothing_was_seen() -> None:
     detector = Detector((0.4, 0.4), 1.0, 0.5, seed=1)
     assert detector.frame(state(0, counts=False))["detections"] == []
+
+
+def test_of_several_aircraft_it_follows_its_own_and_nobody_before_that_is_there() -> None:
+    mine = {"name": "south", "pose": {"time": 7.0}, "footprint": {"cells": []}}
+    whole = {**state(0), "aircraft": [{"name": "north", **state(1)}, mine]}
+    assert of_aircraft(whole, "south")["pose"] == {"time": 7.0}
+    assert of_aircraft(whole, "")["pose"] == {"time": 0.0}
+    assert of_aircraft({**whole, "aircraft": []}, "south")["pose"] is None
 
 
 def test_ids_are_never_repeated() -> None:
@@ -126,3 +191,15 @@ def test_a_report_without_an_answer_is_sent_again_as_it_was(faults: int) -> None
     again, others = service.reports[: faults + 1], service.reports[faults:]
     assert all(report == again[0] for report in again)
     assert len({report["id"] for report in others}) == len(others)
+
+
+@pytest.mark.parametrize("module", ["sim.detector", "sim.autopilot.cli"])
+def test_what_starts_beside_every_flight_imports_no_compiler(module: str) -> None:
+    program = f"import sys, {module}; print(*sorted(sys.modules))"
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert {name.split(".")[0] for name in said.split()} & {
+        "numba",
+        "llvmlite",
+        "skimage",
+        "roisearch",
+    } == set()

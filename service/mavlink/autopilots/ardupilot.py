@@ -11,8 +11,9 @@ from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from service.mavlink.autopilots.base import Autopilot, Stream
+from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.command import Command
+from service.mavlink.framing import Message
 from service.mavlink.modes import ModeKind
 
 _MODES = {
@@ -46,6 +47,16 @@ _MODES = {
 _NUMBERS = {name: number for number, name in _MODES.items()}
 _PILOTED = (0, 1, 2, 5, 11, 13, 14, 15, 16, 22, 24, 28)
 _CUSTOM_MODE_ENABLED = 1.0
+_ONLY_VELOCITY = (
+    mavlink.POSITION_TARGET_TYPEMASK_X_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Y_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_Z_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_AZ_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
+)
 
 
 class ArduCopter(Autopilot):
@@ -67,10 +78,7 @@ class ArduCopter(Autopilot):
         **{_MODES[number]: ModeKind.PILOT for number in _PILOTED},
     }
     deceleration_mps2 = 2.1
-    extra_streams = (
-        Stream(mavlink.MAVLINK_MSG_ID_WIND, 1.0, optional=True),
-        Stream(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 1.0, optional=True),
-    )
+    answers_reposition = True
     not_ready_texts = ("PreArm:", "Arm:")
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
@@ -92,6 +100,18 @@ class ArduCopter(Autopilot):
     def follows(self, previous: str, mode: str, *, armed: bool, climbed: bool) -> bool:
         """Nothing: it stays in GUIDED after a take-off and in RTL or LAND after a landing."""
         return False
+
+    def brake(self) -> Command:
+        """The mode BRAKE. It is left by entering GUIDED again."""
+        return self.set_mode("BRAKE")
+
+    def stand_still(self, system: int, component: int) -> list[Message]:
+        """A velocity of zero, which GUIDED takes without asking for a position as BRAKE does."""
+        return [
+            mavlink.MAVLink_set_position_target_local_ned_message(
+                0, system, component, mavlink.MAV_FRAME_LOCAL_NED, _ONLY_VELOCITY, *[0.0] * 11
+            )
+        ]
 
     def refuses_reposition(self, result: int) -> bool:
         """Its answer is true: DENIED outside GUIDED or for an absurd place, FAILED outside the fence."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -18,15 +17,6 @@ from service.mavlink.command import Command
 from service.mavlink.events import Target
 from service.mavlink.framing import Message
 from service.mavlink.modes import ModeKind
-
-
-@dataclass(frozen=True, slots=True)
-class Stream:
-    """A message asked for at a rate; an optional one is not asked for again once it was refused."""
-
-    message_id: int
-    hz: float
-    optional: bool = False
 
 
 class Autopilot(ABC):
@@ -38,6 +28,8 @@ class Autopilot(ABC):
     """The mode that flies repositions."""
     guided_title: ClassVar[str]
     """What a ground station calls that mode."""
+    take_over_advice: ClassVar[str] = ""
+    """What the pilot must know to take over, when not every mode does it; fits into one STATUSTEXT."""
     takeoff_mode: ClassVar[str]
     """The mode the heartbeat shows during the climb."""
     return_mode: ClassVar[str]
@@ -46,7 +38,8 @@ class Autopilot(ABC):
     """Of every mode name that is not OTHER."""
     deceleration_mps2: ClassVar[float]
     """How hard it brakes for a reposition that is closer than it can stop."""
-    extra_streams: ClassVar[tuple[Stream, ...]]
+    answers_reposition: ClassVar[bool]
+    """Its answer to DO_REPOSITION is true, and it denies a place that is not on earth."""
     not_ready_texts: ClassVar[tuple[str, ...]]
     """How a STATUSTEXT begins that says why it cannot be armed."""
 
@@ -75,6 +68,14 @@ class Autopilot(ABC):
     def refuses_reposition(self, result: int) -> bool:
         """Whether this MAV_RESULT of DO_REPOSITION really means that the target is not flown."""
 
+    @abstractmethod
+    def brake(self) -> Command:
+        """Stop as fast as is sensible and stay, by the autopilot's own estimate: no position of ours is needed."""
+
+    def stand_still(self, system: int, component: int) -> list[Message]:
+        """What stops it in the guided mode when it refuses `brake`; nothing where there is no such thing."""
+        return []
+
     def mode_kind(self, mode: str) -> ModeKind:
         """What this mode means to a search."""
         return self.kinds.get(mode, ModeKind.OTHER)
@@ -97,7 +98,8 @@ class Autopilot(ABC):
     def change_speed(self, speed_mps: float) -> Command:
         """MAV_CMD_DO_CHANGE_SPEED, ground speed; it lasts until the next one."""
         params = (float(mavlink.SPEED_TYPE_GROUNDSPEED), speed_mps, -1.0)
-        return Command(mavlink.MAV_CMD_DO_CHANGE_SPEED, params, motion=True, label=f"{speed_mps:g} m/s")
+        number, label = mavlink.MAV_CMD_DO_CHANGE_SPEED, f"{speed_mps:g} m/s"
+        return Command(number, params, motion=True, label=label, speed_mps=speed_mps)
 
     def reposition(self, target: Target, system: int, component: int) -> Message:
         """MAV_CMD_DO_REPOSITION as COMMAND_INT, frame GLOBAL with AMSL altitude, and never a mode change.
@@ -129,6 +131,10 @@ class Autopilot(ABC):
     def says_not_ready(self, text: str) -> bool:
         """Whether a STATUSTEXT says that the vehicle cannot be armed."""
         return text.startswith(self.not_ready_texts)
+
+    def holds_by_failsafe(self, mode: str, system_status: int, texts: Iterable[str]) -> bool:
+        """Whether the guided mode is now the autopilot's own failsafe, and not ours any longer."""
+        return False
 
     def looks_like_failsafe(self, mode: str, system_status: int, texts: Iterable[str]) -> bool:
         """Whether a change to `mode` that nobody commanded looks like the autopilot's own failsafe.

@@ -8,11 +8,12 @@ twice, and a reposition without the change-mode flag gets UNSUPPORTED and is flo
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from service.mavlink.autopilots.base import Autopilot, Stream
+from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.command import Command
 from service.mavlink.modes import ModeKind
 
@@ -40,6 +41,7 @@ class PX4(Autopilot):
     title = "PX4"
     guided_mode = "AUTO_LOITER"
     guided_title = "Hold"
+    take_over_advice = "To take over select Position, not Hold"
     takeoff_mode = "AUTO_TAKEOFF"
     return_mode = "AUTO_RTL"
     land_mode = "AUTO_LAND"
@@ -57,10 +59,7 @@ class PX4(Autopilot):
         "RATTITUDE": ModeKind.PILOT,
     }
     deceleration_mps2 = 1.2
-    extra_streams = (
-        Stream(mavlink.MAVLINK_MSG_ID_WIND_COV, 1.0, optional=True),
-        Stream(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, 1.0, optional=True),
-    )
+    answers_reposition = False
     not_ready_texts = ("Preflight Fail", "Arming denied")
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
@@ -92,6 +91,18 @@ class PX4(Autopilot):
         if previous == self.takeoff_mode:
             return climbed
         return self.mode_kind(previous) in (ModeKind.RETURN, ModeKind.LAND) and not armed
+
+    def brake(self) -> Command:
+        """DO_REPOSITION to nowhere: with no place, no altitude and no yaw PX4 pauses at its own stopping point
+        (`Navigator::run`, 'All three set to NaN - pause vehicle'). Without the flag it cannot take a mode."""
+        params = (-1.0, 0.0, 0.0, math.nan, math.nan, math.nan, math.nan)
+        return Command(mavlink.MAV_CMD_DO_REPOSITION, params, motion=True, attempts=3, label="stop")
+
+    def holds_by_failsafe(self, mode: str, system_status: int, texts: Iterable[str]) -> bool:
+        """Its failsafe 'entering Hold for 5 seconds' is in the mode in which it follows us. Two signs are asked for: it
+        calls its state critical, and has spoken of a failsafe just before."""
+        critical = system_status in (mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY)
+        return critical and mode == self.guided_mode and any("failsafe" in text.lower() for text in texts)
 
     def refuses_reposition(self, result: int) -> bool:
         """Never: the answer to a reposition without the change-mode flag is UNSUPPORTED either way."""

@@ -22,6 +22,7 @@ _MULTICOPTERS = frozenset(
         mavlink.MAV_TYPE_TRICOPTER,
         mavlink.MAV_TYPE_DODECAROTOR,
         mavlink.MAV_TYPE_DECAROTOR,
+        43,  # MAV_TYPE_GENERIC_MULTIROTOR, which the dialect does not name yet
     }
 )
 

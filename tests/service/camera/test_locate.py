@@ -16,7 +16,8 @@ from service.camera.locate import shares
 from service.camera.sensor import CameraSensor, Mount
 from service.config import Settings
 from service.evidence.calibration import Calibration
-from service.evidence.observe import Pose, Sensor, Unreadable, observe
+from service.evidence.mask import Sensor
+from service.evidence.observe import FramePose, Unreadable, observe
 from service.evidence.passes import Passes
 from service.evidence.reports import Gimbal, Report
 from service.evidence.sensors import camera_sensor, cell_size, field_of_view
@@ -42,9 +43,9 @@ def sight(pitch: float) -> Sight:
     return sight_from(CAMERA, (0.0, 0.0, 60.0), rotation(0.0, pitch, 0.0))
 
 
-def pose(row: float, col: float, **angles: float) -> Pose:
+def pose(row: float, col: float, **angles: float) -> FramePose:
     lat, lon = FRAME.to_latlon([[row, col]])[0]
-    return Pose(float(lat), float(lon), 60.0, 20.0, 0.0, **angles)
+    return FramePose(float(lat), float(lon), 60.0, 20.0, 0.0, **angles)
 
 
 def report(*detections: dict[str, object], **more: object) -> Report:
@@ -92,7 +93,7 @@ def test_the_cells_of_a_spot_have_the_gaussians_mass() -> None:
 
 def test_a_box_says_the_same_as_its_own_projection_onto_the_ground() -> None:
     here = pose(15, 15)
-    spot = SENSOR._spot(SENSOR.sight(here), report({"box": [900, 500, 920, 540]}).detections[0])
+    spot = SENSOR.spot(SENSOR.sight(here), report({"box": [900, 500, 920, 540]}).detections[0])
     assert spot is not None
     lat, lon = FRAME.from_metres(spot.point[None])[0]
     by_box = SENSOR.read(here, report({"box": [908, 518, 912, 522]})).hits
@@ -109,9 +110,13 @@ def test_an_exact_detection_is_a_hit_of_its_cell_and_a_miss_elsewhere() -> None:
     assert hits == {(row, col): pytest.approx(footprint.p_tp[i] / (1.0 - footprint.p_tn[i]))}
 
 
-def test_a_detection_off_the_footprint_is_no_hit() -> None:
+def test_a_detection_that_the_image_cannot_show_is_refused_with_the_distance() -> None:
     lat, lon = FRAME.to_latlon([[28, 28]])[0]
-    assert SENSOR.read(pose(15, 15), report({"lat": lat, "lon": lon, "accuracy_m": 3.0})).hits == {}
+    for told in ({"lat": lat, "lon": lon, "accuracy_m": 3.0}, {"lat": lat, "lon": lon}):
+        with pytest.raises(
+            Unreadable, match=r"lies 496 m from what its frame shows; are captured_at, the heading"
+        ):
+            SENSOR.read(pose(15, 15), report(told))
 
 
 def test_a_hit_spread_over_cells_is_bayes_rule() -> None:
@@ -122,7 +127,7 @@ def test_a_hit_spread_over_cells_is_bayes_rule() -> None:
     looked = footprint.counts
     cells = [(row, col) for row, col in footprint.cells[looked].tolist()]
     p_tp, p_tn = footprint.p_tp[looked], footprint.p_tn[looked]
-    spot = SENSOR._spot(SENSOR.sight(here), report({"box": [1200, 500, 1300, 640]}).detections[0])
+    spot = SENSOR.spot(SENSOR.sight(here), report({"box": [1200, 500, 1300, 640]}).detections[0])
     assert spot is not None
     chances = spread(spot, FRAME.cell_m)
     assert len(chances) > 2
@@ -206,7 +211,7 @@ def test_a_drawn_footprint_may_lie_across_the_date_line() -> None:
     assert {-1.0, 1.0} == set(np.sign(corners[:, 1]).tolist())
     lat, lon = frame.to_latlon([[15, 15]])[0].tolist()
     begun = time.perf_counter()
-    seen = there.read(Pose(lat, lon, 60.0, 0.0, 0.0), report(footprint=corners.tolist())).footprint
+    seen = there.read(FramePose(lat, lon, 60.0, 0.0, 0.0), report(footprint=corners.tolist())).footprint
     assert time.perf_counter() - begun < 1.0
     assert len(seen.cells) == 22
     assert seen.covered == pytest.approx(np.ones(22), abs=1e-6)
@@ -282,7 +287,7 @@ def test_a_score_has_the_likelihood_ratio_of_the_calibration() -> None:
 
 
 def test_the_middle_of_the_image_lies_where_the_nose_points_on_the_globe() -> None:
-    here = Pose(*(float(x) for x in FRAME.to_latlon([[15, 15]])[0]), 60.0, 70.0, 0.0)
+    here = FramePose(*(float(x) for x in FRAME.to_latlon([[15, 15]])[0]), 60.0, 70.0, 0.0)
     ahead = report({"box": [958, 538, 962, 542]}, gimbal={"pitch_deg": -45.0})
     (seen,) = SENSOR.read(here, ahead).sightings
     azimuth, _, metres = pyproj.Geod(ellps="WGS84").inv(here.lon, here.lat, seen.lon, seen.lat)

@@ -1,0 +1,37 @@
+"""`roisearch-service pack`: a run as one file, to go on with it on another computer."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+
+def parser() -> argparse.ArgumentParser:
+    """The flags."""
+    p = argparse.ArgumentParser(
+        prog="roisearch-service pack",
+        description="Put a run, under way or over, into one file: journal, area, prior and settings without secrets.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="example:\n"
+        "  roisearch-service pack runs/20260501-140312-north-slope\n"
+        "  roisearch-service --resume 20260501-140312-north-slope.zip     on the other computer",
+    )
+    p.add_argument("run", metavar="RUN", type=Path, help="the folder of a run")
+    p.add_argument("--out", metavar="FILE", type=Path, help="the file to write (RUN.zip, here)")
+    return p
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write the file; returns the exit code. Raises BadInput."""
+    options = parser().parse_args(list(arguments))
+    from service.journal import read_meta
+    from service.packing import left_out, pack
+    from service.survey import JOURNAL
+
+    out = options.out or Path(f"{options.run.resolve().name}.zip")
+    rows = pack(options.run, out)
+    print(f"{out}: {rows} rows, the area and the settings without secrets")
+    if stays := left_out(read_meta(options.run / JOURNAL, "settings")):
+        print(f"to be given again there: {', '.join(f'{section}.{key}' for section, key in stays)}")
+    return 0

@@ -1,0 +1,93 @@
+"""What all aircraft of a search have in common: the ground, what is known of the target, who plans to look where."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from roisearch import Fleet
+from roisearch.place import Place, most_likely_place
+from service.area import Grid
+from service.drawing import Drawing
+from service.known import Known, Said, Withdrawn
+from service.news.bearing import FieldNews
+from service.redrawing import Redrawing, Sketch
+
+
+@dataclass(eq=False)
+class Common:
+    """One search, whoever flies it.
+
+    Args:
+        drawn: the grid of the area file.
+        known: what is known of the target.
+        drawing: the regions of interest as they are drawn now.
+    """
+
+    drawn: Grid
+    known: Known
+    drawing: Drawing
+    grid: Grid = field(init=False)
+    """The same without what is excluded by now."""
+    others: Fleet = field(default_factory=Fleet)
+    """Who plans to look where; nobody is in it while one aircraft flies."""
+    believing: asyncio.Lock = field(default_factory=asyncio.Lock)
+    """Held while something is written down and then believed: all aircraft's reports keep the journal's order."""
+    new_ground: list[Callable[[Grid], None]] = field(default_factory=list)
+    """Called when other ground may be flown over."""
+    _redrawing: Redrawing | None = None
+    new_drawing: list[Callable[[Sketch], None]] = field(default_factory=list)
+    """Called when other regions are drawn."""
+    _place: Place | None = None
+
+    def __post_init__(self) -> None:
+        self.grid = self.drawn
+
+    @property
+    def place(self) -> Place:
+        """The most likely place of the target now."""
+        if self._place is None:
+            self._place = most_likely_place(self.known.belief.probability())
+        return self._place
+
+    def take(self, said: Said, time: float | None) -> None:
+        """Believe what was seen, judged or told, exactly, at its time; see `Known.take`."""
+        self.known.take(said, time)
+        self._place = None
+        if isinstance(said, (FieldNews, Withdrawn)):
+            self.fly_on(self.ground_of(self.known))
+
+    def go_back(self, known: Known, grid: Grid | None) -> None:
+        """Take up another state of what is known, which is ours from now on, with the ground of it."""
+        self.known, self._place = known, None
+        self.fly_on(grid or self.ground_of(known))
+
+    def ground_of(self, known: Known) -> Grid:
+        """The grid of the area file without what is excluded by then. Raises BadInput when that leaves nothing."""
+        grid = self.drawn
+        for news in known.excluded:
+            assert news.ground is not None
+            grid = grid.excluding(news.ground)
+        return grid
+
+    def fly_on(self, grid: Grid) -> None:
+        """Other ground may be flown over now."""
+        self.grid = grid
+        for each in self.new_ground:
+            each(grid)
+
+    @property
+    def redrawing(self) -> Redrawing | None:
+        """What draws the regions again as the belief changes; None: nothing does."""
+        return self._redrawing
+
+    def redraw_by(self, redrawing: Redrawing) -> None:
+        """Draw the regions again from now on, as the belief changes."""
+        self._redrawing = redrawing
+
+    def draw(self, sketch: Sketch) -> None:
+        """Other regions of interest are flown by now."""
+        self.drawing = sketch.drawing
+        for each in self.new_drawing:
+            each(sketch)

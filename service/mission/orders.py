@@ -1,0 +1,149 @@
+"""What an operator orders, and what it takes: some orders need the aircraft in the guided mode and in our hands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from service.mission.departing import climb
+from service.mission.effects import Answer, EnterGuided, WaitReady
+from service.mission.finding import tell
+from service.mission.news import Judged, Order
+from service.mission.phase import Find, Happen, Hold, Overtaken, Pending, Replace, Settle, Wish, warn
+from service.mission.situation import on_ground
+from service.mission.standing import Look
+from service.mission.states import FLYING, TABLE, Event, State
+
+ASKED = "the operator asked"
+SIGNAL = "stopped by a signal"
+_EVENTS = {
+    "hold": Event.HOLD,
+    "resume": Event.RESUME,
+    "return": Event.RETURN,
+    "finish": Event.FINISH,
+    "abort": Event.ABORT,
+}
+_SO_ALREADY = {
+    "hold": {State.HOLDING},
+    "resume": FLYING,
+    "return": {State.RETURNING},
+    "finish": {State.RETURNING},
+    "abort": {State.ABORTED},
+}
+FINISHED = "the operator finished the search"
+STOPPING = ("hold", "return", "home", "finish", "abort", "leave")
+"""Orders that go out first and are journalled after. What was ordered before one of them counts no more."""
+_MAY_LAUNCH = (State.READY, State.GROUNDED, State.YIELDED, State.HOLDING)
+STICKS = 0.15  # part of their way, from which on deflected sticks are a hand on them
+
+
+def ordered(order: Order, look: Look) -> Iterator[Wish]:
+    """Hold, resume, return, launch, replace, finish or abort."""
+    state, ours, t = look.standing.state, _ours(look), look.seen.telemetry
+    down, first = on_ground(t), False
+    wish: Happen | Hold
+    if order.command in STOPPING:
+        yield Overtaken(f"the operator ordered {order.command}")
+    if why := _refusal(order.command, look):
+        if order.command in STOPPING and look.ordered:  # that is what it was to stop
+            yield Answer(order.ticket)
+            return
+        yield from warn(f"{order.command} is refused: {why}", look)
+        yield Answer(order.ticket, why)
+        return
+    match order.command:
+        case "hold":  # the autopilot may be climbing, or flying home by itself
+            wish = Hold("operator", ASKED)
+            first = state in (State.RETURNING, State.TAKEOFF) and not ours and not down
+        case "resume":
+            wish = Happen(Event.RESUME, ASKED)
+            first = state in (State.YIELDED, State.HOLDING) and not ours
+        case "return":
+            wish = Happen(Event.RETURN, ASKED, stopped="the operator asked to return")
+            first = state == State.YIELDED and not down
+        case "launch":
+            yield Answer(order.ticket)  # getting ready may take long
+            yield Pending(order.command, WaitReady(), (climb(look),), 0)
+            return
+        case "replace":
+            yield Replace(order.system_id)
+            yield Answer(order.ticket)
+            return
+        case "finish" if state == State.RETURNING:
+            yield Settle(FINISHED)
+            yield Answer(order.ticket)
+            return
+        case "finish":
+            wish = Happen(Event.FINISH, ASKED, stopped=FINISHED, searched=True)
+        case "home":  # and the process ends, whatever is left to search
+            yield Happen(Event.RETURN, SIGNAL, stopped=SIGNAL)
+            yield Settle("")
+            yield Answer(order.ticket)
+            return
+        case "leave":  # whoever ends the process has said nothing about the search
+            wish = Happen(Event.ABORT, SIGNAL, stopped=SIGNAL)
+        case "abort":
+            wish, first = Happen(Event.ABORT, ASKED, stopped="the operator aborted the run"), False
+        case _:
+            yield Answer(order.ticket)
+            return
+    if first:
+        yield Pending(order.command, EnterGuided(), (wish,), order.ticket)
+    else:
+        yield wish
+        yield Answer(order.ticket)
+
+
+def judged(word: Judged, look: Look) -> Iterator[Wish]:
+    """What follows from an operator's word on a place, which the belief knows by now."""
+    standing = look.standing
+    said = f"the operator {'confirmed' if word.confirmed else 'rejected'} the place"
+    if word.confirmed and word.found is not None:
+        yield Find(word.found)
+        yield from tell(word.found, look, said)
+    elif not word.confirmed and standing.found is not None and word.found is None:
+        yield Find(None)
+        wish = Happen(Event.REJECTED, said)
+        ended_for_it = standing.state == State.RETURNING and not standing.why_stopped
+        if ended_for_it and not _ours(look):
+            yield Pending("reject", EnterGuided(), (wish,), word.ticket)
+            return
+        if ended_for_it or standing.state == State.FOUND:
+            yield wish
+    yield Answer(word.ticket)
+
+
+def _refusal(command: str, look: Look) -> str:
+    """Why an order cannot be obeyed now, for the person who gave it, or nothing."""
+    state, t = look.standing.state, look.seen.telemetry
+    if command in _EVENTS and state not in _SO_ALREADY[command] and (state, _EVENTS[command]) not in TABLE:
+        return f"there is nothing to {command} in {state}"
+    if command == "resume" and state in (State.YIELDED, State.HOLDING):
+        if on_ground(t):
+            return "the aircraft is on the ground; order launch, or take off and then resume"
+        if (t.sticks or 0.0) > STICKS:
+            return "the pilot's sticks are not in the middle; the pilot has the aircraft"
+    if command == "launch":
+        if state not in _MAY_LAUNCH or not on_ground(t):
+            return f"a launch is for an aircraft on the ground before its flight; this one is {state}"
+        if not look.terms.may_take_off:
+            return "this service was not allowed to arm or take off (--takeoff)"
+        return look.helm.unfit(t, look.seen.others) or look.helm.too_empty(t, look.seen.others)
+    if command == "replace":
+        return _why_not_replace(look)
+    return ""
+
+
+def _why_not_replace(look: Look) -> str:
+    """Why no other aircraft can come now, or nothing."""
+    state, t = look.standing.state, look.seen.telemetry
+    if state != State.GROUNDED:
+        return f"another aircraft comes between two sorties, in {State.GROUNDED}; this one is {state}"
+    if look.heard() and not on_ground(t):
+        return "the aircraft that is heard does not stand on the ground with its motors off"
+    return ""
+
+
+def _ours(look: Look) -> bool:
+    """The aircraft is in our hands, and follows our waypoints."""
+    t = look.seen.telemetry
+    return t.in_control and t.guided and not look.standing.autopilot_returns

@@ -1,0 +1,47 @@
+"""What the mission's core is shown each time it is asked: the aircraft, the search and the journal as they are now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from service.evidence.found import Found
+from service.mavlink.telemetry import Telemetry
+from service.mission.apart import Other
+
+
+@dataclass(frozen=True)
+class Situation:
+    """One moment, as a value.
+
+    `guided_title` is what pilots call the mode in which the aircraft follows us. `events_waiting`: the telemetry is
+    ahead of what the core was told, so the reason of what it shows may come yet. `journal_behind_s`: for how long the
+    oldest row has waited to be on disk. `reported_at`: when the last detector report was taken in; `why_no_report`: why
+    none was since. `searched`: the POS so far; `place_probability` that of the most likely place, `found` that place if
+    it counts as found (both while searching, on the way home and between two sorties); `confirmed`: an operator said
+    that it is the target's. `suspect_in_view`: a frame taken now shows it. `others`: the other aircraft of the same
+    search; `over`: why that is over for all of them, which is told where there are others.
+    """
+
+    telemetry: Telemetry = field(default_factory=Telemetry)
+    guided_title: str = "the guided mode"
+    events_waiting: bool = False
+    journal_behind_s: float = 0.0
+    reported_at: float = 0.0
+    why_no_report: str = "the detector is silent"
+    searched: float = 0.0
+    place_probability: float = 0.0
+    found: Found | None = None
+    confirmed: bool = False
+    suspect_in_view: bool = False
+    others: tuple[Other, ...] = ()
+    over: str = ""
+
+
+def on_ground(t: Telemetry) -> bool:
+    """On the ground with the motors off."""
+    return not t.armed and t.landed_state == "on_ground"
+
+
+def hovering(t: Telemetry) -> bool:
+    """In the air, armed, in the guided mode."""
+    return t.landed_state == "in_air" and t.guided and t.armed

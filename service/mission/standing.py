@@ -1,0 +1,116 @@
+"""How a mission stands: all that the table's states are about, in one value with one owner, the core."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from service.config import Settings
+from service.evidence.found import Found
+from service.mission.chart import Chart
+from service.mission.energy import Energy, Left
+from service.mission.flight import Flight
+from service.mission.helm import Helm
+from service.mission.situation import Situation
+from service.mission.states import FLYING, State
+
+LEAST_PATIENCE_WALL_S = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Where the mission stands.
+
+    Args:
+        state: its state in the table.
+        why: the reason of the last transition.
+        since: when that was.
+        why_stopped: why the search ended or the run was broken off; empty while it goes on.
+        searched: the search ended because there was nothing more to gain, not by an order.
+        settled: nothing is left to fly for: it was searched enough, found, or an operator has finished it.
+        found: the place that counts as found.
+        causes: what it holds for; the hold ends when none is left.
+        homeward: it flies home, or holds on the way there, or waits after a restart that found it so.
+        direct: the way home is the autopilot's own: ours could not be flown.
+        autopilot_returns: the return to launch was ordered: it flies by itself now, or soon.
+        listening_since: since when a silence of the detector counts.
+    """
+
+    state: State = State.WAITING
+    why: str = ""
+    since: float = 0.0
+    why_stopped: str = ""
+    searched: bool = False
+    settled: bool = False
+    found: Found | None = None
+    causes: frozenset[str] = frozenset()
+    homeward: bool = False
+    direct: bool = False
+    autopilot_returns: bool = False
+    listening_since: float = 0.0
+
+    @property
+    def goes_home(self) -> bool:
+        """Nothing is left but the way home."""
+        return self.state in (State.RETURNING, State.FOUND)
+
+    @property
+    def goes_home_by_itself(self) -> bool:
+        """The autopilot has been told to, or is about to be: which needs neither our waypoints nor our journal."""
+        return self.state == State.RETURNING and (self.direct or self.autopilot_returns)
+
+    @property
+    def flying(self) -> bool:
+        """It searches."""
+        return self.state in FLYING
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """On what terms a mission flies: how fast its clock runs, how old a position and a heartbeat may be (seconds),
+    whether it may arm and take off, whether it may do so by itself where the run has flown already (an aircraft of the
+    built-in world is another one then), and whether nobody asked for this start: what started the service anew is no
+    person who has looked at the aircraft. `name` is that of the aircraft, where there are several."""
+
+    speedup: float = 1.0
+    position_fresh_s: float = 2.0
+    heartbeat_fresh_s: float = 2.0
+    may_take_off: bool = False
+    may_take_off_again: bool = False
+    restarted: bool = False
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What a phase sees when it is asked; it changes nothing of it. `busy`: an action is under way; `ordered`: the
+    order that this is for, if it is for one."""
+
+    standing: Standing
+    seen: Situation
+    now: float
+    busy: bool
+    chart: Chart
+    helm: Helm
+    flight: Flight
+    energy: Energy
+    settings: Settings
+    terms: Terms
+    ordered: str = ""
+
+    def energy_low(self) -> str:
+        """Why the aircraft must fly home now, or nothing."""
+        return self.energy.objection(self.flight.aloft_s(self.now), self.settings.flight)
+
+    def battery_left(self) -> Left | None:
+        """What the battery leaves for the search and the way home; None while that is not known."""
+        home = self.chart.home(self.seen.telemetry)
+        return self.energy.left(self.flight.aloft_s(self.now), home, self.settings.flight)
+
+    def detector_silent(self) -> bool:
+        """No report for too long; never shorter than what a busy host may need in wall time."""
+        limit = max(self.settings.sensor.silent_after_s, LEAST_PATIENCE_WALL_S * self.terms.speedup)
+        return self.now - max(self.seen.reported_at, self.standing.listening_since) > limit
+
+    def heard(self) -> bool:
+        """A heartbeat has come lately."""
+        return self.now - self.seen.telemetry.heartbeat_time < self.terms.heartbeat_fresh_s

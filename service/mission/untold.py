@@ -1,0 +1,42 @@
+"""What nobody tells, and a person must know for that: the level of the battery, and the wind."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+
+from service.mavlink.telemetry import Wind
+from service.mission.effects import Note, Tell
+from service.mission.phase import Wish
+from service.mission.situation import on_ground
+from service.mission.standing import Look
+
+BATTERY_S = 15.0  # after so long in the air a battery that was not told yet is one that is not told
+WIND_S = 60.0  # after so long in the air the wind is told, or has been reckoned
+_WARNING = 4  # MAV_SEVERITY
+
+
+class Untold:
+    """Says each once: to the pilot, on the console, and (the battery) on the page for as long as it is so."""
+
+    def __init__(self) -> None:
+        self.battery = ""
+        """What is reckoned of the battery's level, or nothing while that is told."""
+        self._wind_said = False
+
+    def tick(self, look: Look, wind: Wind | None) -> Iterator[Wish]:
+        """Look at the battery's level, and at the wind as it is told or reckoned (None: not known)."""
+        if not on_ground(look.seen.telemetry):
+            doubt = look.energy.warning() if look.flight.aloft_s(look.now) > BATTERY_S else ""
+            if doubt and not self.battery:
+                yield Note(doubt, logging.WARNING)
+                yield Tell(f"search: {doubt}", _WARNING)
+            self.battery = doubt
+        if not look.standing.flying:
+            return
+        self._wind_said &= wind is None
+        if wind is None and not self._wind_said and look.flight.aloft_s(look.now) > WIND_S:
+            self._wind_said = True
+            said = "the wind is not known, neither told nor reckoned from the lean: max_wind_mps does nothing"
+            yield Note(said, logging.WARNING)
+            yield Tell("search: wind is not known, look at it yourself", _WARNING)

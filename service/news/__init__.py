@@ -1,0 +1,1 @@
+"""News from the field: clues, and ground that others have searched."""

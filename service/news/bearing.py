@@ -1,0 +1,79 @@
+"""What a piece of news says about each cell. Pure: a place on the ground goes in, numbers for cells come out.
+
+A clue has a Bayes factor: how many times likelier it is to be met with if the target is there than if it is far from
+there. A footprint that only the missing person can have left has a large one, a garment that anybody may have lost a
+small one; below 1 it speaks against the place. At a point or a line it falls off as a Gaussian with the distance, in a
+polygon it counts by the part of the cell that is covered. Ground that others have searched has a probability of
+detection (POD), by the part of the cell that is covered. An exclusion says nothing of the target: it is ground that
+must not be flown over any more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from service.area.frame import GridFrame
+from service.area.prior import cell_squares, covered_fraction
+
+Role = Literal["clue", "searched", "exclude"]
+_NOTHING = 1e-6  # a factor so near to 1, or a POD so near to 0, is none
+
+
+@dataclass(frozen=True, eq=False)
+class FieldNews:
+    """One piece of news as it is believed.
+
+    `cells` int [k, 2]; `values` float [k]: for a clue the factors by which the prior there is multiplied, for ground
+    that was searched the POD of it, for an exclusion the part that it covers. `ground` are its polygons in degrees, x =
+    longitude, if it is drawn as such. `words` are whose who sent it; `place` is its middle, latitude and longitude.
+    """
+
+    id: str
+    role: Role
+    words: str
+    place: tuple[float, float]
+    cells: NDArray[np.int64]
+    values: NDArray[np.float64]
+    ground: shapely.MultiPolygon | None = None
+
+    def says_as(self, other: FieldNews) -> bool:
+        """Whether the other one says the same, under whatever name."""
+        return (
+            (self.role, self.words) == (other.role, other.words)
+            and np.array_equal(self.cells, other.cells)
+            and np.array_equal(self.values, other.values)
+            and self.ground == other.ground
+        )
+
+
+def clue_factors(
+    frame: GridFrame, shape: shapely.Geometry, bayes_factor: float, sigma_m: float | None
+) -> NDArray[np.float64]:
+    """The factor of each cell, float [rows, cols]; `shape` in degrees, `sigma_m` for what is no polygon."""
+    flat = frame.flatten(shape)
+    if shape.geom_type in ("Polygon", "MultiPolygon"):
+        share = covered_fraction(cell_squares(frame), flat)
+    else:
+        assert sigma_m is not None
+        rows, cols = np.indices(frame.shape)
+        middles = shapely.points((cols + 0.5) * frame.cell_m, (rows + 0.5) * frame.cell_m)
+        share = np.exp(-0.5 * (shapely.distance(middles, flat) / sigma_m) ** 2)
+    return np.asarray(1.0 + (bayes_factor - 1.0) * share)
+
+
+def searched_pod(frame: GridFrame, shape: shapely.Geometry, pod: float) -> NDArray[np.float64]:
+    """The POD of each cell, float [rows, cols]; `shape` in degrees."""
+    return pod * covered_fraction(cell_squares(frame), frame.flatten(shape))
+
+
+def told_cells(
+    values: NDArray[np.float64], searchable: NDArray[np.bool_], neutral: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The searchable cells about which something is said, int [k, 2], and what, float [k]."""
+    says = searchable & (np.abs(values - neutral) > _NOTHING)
+    return np.argwhere(says).astype(np.int64), values[says]

@@ -1,0 +1,164 @@
+"""News as it comes through the door: a GeoJSON feature (RFC 7946), checked, and what it says about the ground."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+import shapely
+from pydantic import ConfigDict, Field, model_validator
+
+from service.area import Grid
+from service.area.geojson import Where, multipolygon, position
+from service.area.geojson import line as read_line
+from service.errors import BadInput, shown
+from service.evidence.reports import DoorModel
+from service.news.bearing import FieldNews, clue_factors, searched_pod, told_cells
+
+SCHEMA_ID = "urn:roisearch:news:1"
+MOST_CELLS = 200_000
+"""So many cells can one piece of news speak of; the journal keeps each of them."""
+
+
+class Clue(DoorModel):
+    """Something that bears on where the target is."""
+
+    role: Literal["clue"]
+    bayes_factor: float = Field(
+        ge=1e-3,
+        le=1e3,
+        description="how many times likelier this is to be met with if the target is there than if it is far "
+        "from there; below 1 it speaks against the place",
+    )
+    sigma_m: float | None = Field(
+        default=None, gt=0, le=1e5, description="how far from a point or a line it still counts, metres"
+    )
+    words: str = Field(default="", max_length=200, description="what it is, for people")
+
+
+class Searched(DoorModel):
+    """Ground that others have searched in vain."""
+
+    role: Literal["searched"]
+    pod: float = Field(
+        gt=0, lt=1, description="probability that they would have found a target that was there"
+    )
+    words: str = Field(default="", max_length=200, description="who searched it, for people")
+
+
+class Excluded(DoorModel):
+    """Ground that must not be flown over from now on."""
+
+    role: Literal["exclude"]
+    words: str = Field(default="", max_length=200, description="why, for people")
+
+
+class Shape(DoorModel):
+    """A geometry as RFC 7946 has it, longitude first."""
+
+    type: Literal["Point", "LineString", "MultiLineString", "Polygon", "MultiPolygon"]
+    coordinates: list[Any] = Field(max_length=10_000)
+
+
+class NewsRequest(DoorModel):
+    """A piece of news: a GeoJSON feature. Its `id`, if it has one, keeps it from being counted twice."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, title="News")
+
+    type: Literal["Feature"]
+    id: str | None = Field(default=None, min_length=1, max_length=64)
+    geometry: Shape
+    properties: Annotated[Clue | Searched | Excluded, Field(discriminator="role")]
+
+    @model_validator(mode="after")
+    def _its_shape_is_one(self) -> Self:
+        kind, said = self.geometry.type, self.properties
+        flat = kind in ("Polygon", "MultiPolygon")
+        if not isinstance(said, Clue) and not flat:
+            what = "an exclusion" if isinstance(said, Excluded) else "ground that was searched"
+            raise ValueError(f"{what} is a Polygon or a MultiPolygon, not a {kind}")
+        if isinstance(said, Clue) and flat == (said.sigma_m is not None):
+            raise ValueError(
+                "a clue in a polygon has no sigma_m"
+                if flat
+                else f"a clue at a {kind} needs a sigma_m in metres"
+            )
+        try:
+            self.shape()
+        except BadInput as error:
+            raise ValueError(str(error)) from None
+        return self
+
+    def shape(self) -> shapely.Geometry:
+        """The geometry in degrees, x = longitude. Raises BadInput."""
+        where, kind = Where("the news", "its geometry"), self.geometry.type
+        whole = self.geometry.model_dump()
+        if kind == "Point":
+            return shapely.Point(position(self.geometry.coordinates, where))
+        return read_line(whole, where) if "Line" in kind else multipolygon(whole, where)
+
+    def news(self, grid: Grid, name: str) -> FieldNews:
+        """What it says about a grid, under a name. Raises BadInput when that is nothing, or too much."""
+        shape, said = self.shape(), self.properties
+        if isinstance(said, Clue):
+            values = clue_factors(grid.frame, shape, said.bayes_factor, said.sigma_m)
+            cells, told = told_cells(values, grid.searchable, 1.0)
+        else:
+            pod = said.pod if isinstance(said, Searched) else 1.0
+            cells, told = told_cells(searched_pod(grid.frame, shape, pod), grid.searchable, 0.0)
+        if not len(cells) and not isinstance(said, Excluded):
+            raise BadInput(
+                "the news is about no ground that is searched; are longitude and latitude swapped?"
+            )
+        if len(cells) > MOST_CELLS:
+            raise BadInput(
+                f"the news is about {len(cells)} cells, at most {MOST_CELLS} are taken; make it smaller"
+            )
+        middle = shape.centroid
+        ground = shape if isinstance(shape, shapely.MultiPolygon) else None
+        return FieldNews(name, said.role, said.words, (middle.y, middle.x), cells, told, ground)
+
+
+def refuse_other(news: FieldNews, before: FieldNews, *, stands: bool) -> None:
+    """Raises BadInput when an id comes again with other news, or after its news were taken back: none may be lost."""
+    told = f"news {shown(news.id)}"
+    if not news.says_as(before):
+        raise BadInput(f"{told} says something else than it did before; tell it under an id of its own")
+    if not stands:
+        raise BadInput(f"{told} was taken back; to tell it once more, give it another id")
+
+
+EXAMPLES: dict[str, dict[str, Any]] = {
+    "a clue at a point": {
+        "type": "Feature",
+        "geometry": {"type": "Point", "coordinates": [-4.7402, 56.6093]},
+        "properties": {"role": "clue", "bayes_factor": 20, "sigma_m": 80, "words": "glove, the right size"},
+    },
+    "ground that a team has searched": {
+        "type": "Feature",
+        "id": "team-3-1",
+        "geometry": {
+            "type": "Polygon",
+            "coordinates": [
+                [[-4.742, 56.608], [-4.739, 56.608], [-4.739, 56.6095], [-4.742, 56.6095], [-4.742, 56.608]]
+            ],
+        },
+        "properties": {"role": "searched", "pod": 0.7, "words": "team 3, along the burn"},
+    },
+    "ground not to fly over": {
+        "type": "Feature",
+        "geometry": {
+            "type": "Polygon",
+            "coordinates": [
+                [[-4.743, 56.609], [-4.742, 56.609], [-4.742, 56.61], [-4.743, 56.61], [-4.743, 56.609]]
+            ],
+        },
+        "properties": {"role": "exclude", "words": "helicopter landing site"},
+    },
+}
+"""News that the schema shows, by what they say."""
+
+
+def news_schema() -> dict[str, Any]:
+    """The schema of a piece of news as JSON Schema (draft 2020-12), with examples."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": SCHEMA_ID}
+    return {**head, **NewsRequest.model_json_schema(), "examples": list(EXAMPLES.values())}

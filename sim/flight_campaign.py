@@ -1,0 +1,54 @@
+"""What all campaigns of whole flights have alike: their options, their seeds, and results that are not flown twice."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
+RESULT = "result.json"
+GOES_ON = "With --out, the same command goes on where it was interrupted."
+
+
+def add_options(parser: argparse.ArgumentParser, each: str, *, speedup: float, patience_s: float) -> None:
+    """Seeds, speed and patience of a campaign, and where it keeps its runs; `each` is what has so many seeds."""
+    parser.add_argument("--seeds", type=int, default=20, help=f"how many seeds per {each}, from --first-seed")
+    parser.add_argument("--first-seed", type=int, default=1)
+    parser.add_argument("--speedup", type=float, default=speedup, help="times faster than the wall clock")
+    parser.add_argument(
+        "--patience", type=float, default=patience_s, metavar="S", help="wall seconds a flight may take"
+    )
+    parser.add_argument("--out", type=Path, help="keep the run folders here (default: thrown away)")
+
+
+def add_flavors(parser: argparse.ArgumentParser, *, jobs: int) -> None:
+    """Which mock autopilots fly, and how many flights at a time."""
+    parser.add_argument("--flavors", default="px4,ardupilot", help="mock autopilots, separated by commas")
+    parser.add_argument("--jobs", type=int, default=jobs, help="flights at a time; each keeps a core busy")
+
+
+def seeds_of(options: argparse.Namespace) -> range:
+    """The seeds that are asked for."""
+    return range(options.first_seed, options.first_seed + options.seeds)
+
+
+def kept(folder: Path, fly: Callable[[], T], read: Callable[[dict[str, Any]], T]) -> T:
+    """What came of a flight: as it is kept in its folder, else it is flown and kept there.
+
+    What an interrupted one has left is removed first. `read` makes a result of the fields of one.
+    """
+    file = folder / RESULT
+    if file.exists():
+        return read(json.loads(file.read_text(encoding="utf-8")))
+    shutil.rmtree(folder, ignore_errors=True)
+    result = fly()
+    file.write_text(json.dumps(asdict(result), indent=1), encoding="utf-8")
+    return result

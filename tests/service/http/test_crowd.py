@@ -1,0 +1,96 @@
+"""Half-open connections, many at a time, and an order that gets through all the same."""
+
+from __future__ import annotations
+
+import asyncio
+
+import httpx
+from hypothesis import given
+from hypothesis import strategies as st
+
+from service.http.crowd import Crowd
+
+from .door import FRAME, HOLD, FakeRun, on_a_socket
+
+
+class Guest:
+    def __init__(self, address: str, busy: bool, known: bool = False) -> None:
+        self.address, self.busy, self.known, self.gone = address, busy, known, False
+
+    def idle(self) -> bool:
+        return not self.busy
+
+    def asked(self) -> bool:
+        return self.busy or self.known
+
+    def hang_up(self) -> None:
+        self.gone = True
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.booleans()), max_size=60))
+def test_there_are_never_more_than_enough_and_the_busy_stay(guests: list[tuple[str, bool]]) -> None:
+    crowd, here = Crowd(most=8, most_of_one=5), []
+    for address, busy in guests:
+        guest = Guest(address, busy)
+        crowd.enter(guest, address)
+        here = [each for each in [*here, guest] if not each.gone]
+        assert len(here) == crowd.count <= 8
+        assert sum(each.address == address for each in here) <= 5
+        if guest.gone:  # a newcomer goes only where all the others are answered
+            assert all(each.busy for each in here if each.address == address)
+
+
+def test_who_has_asked_for_something_before_outlasts_those_who_never_did() -> None:
+    crowd, operator = Crowd(most=8, most_of_one=5), Guest("a", busy=False, known=True)
+    crowd.enter(operator, "a")
+    for _ in range(20):
+        crowd.enter(Guest("a", busy=False), "a")
+    assert not operator.gone
+    for _ in range(20):
+        crowd.enter(Guest("a", busy=False, known=True), "a")
+    assert operator.gone, "among their like, the longest silent goes"
+
+
+def test_an_order_gets_through_four_hundred_half_open_connections() -> None:
+    run = FakeRun()
+
+    async def talk() -> int:
+        async with on_a_socket(run, body_timeout_s=60.0) as door:
+            port = door.listener.getsockname()[1]
+            half_open = [await asyncio.open_connection("127.0.0.1", port) for _ in range(400)]
+            for _, writer in half_open[::2]:
+                writer.write(b"POST /api/commands HTTP/1.1\r\nHost: 127.0.0.1\r\n")
+            async with httpx.AsyncClient(base_url=door.url, timeout=30.0) as client:
+                answer = await client.post("/api/commands", json=HOLD)
+            for _, writer in half_open:
+                writer.close()
+            return answer.status_code
+
+    assert asyncio.run(talk()) == 200
+    assert run.orders == ["hold"]
+
+
+def test_an_order_gets_through_where_reports_take_every_slot() -> None:
+    """A report without the end of its body holds its slot until its time is up; orders have slots of their own."""
+    run = FakeRun()
+
+    async def talk() -> list[int]:
+        async with on_a_socket(run, body_timeout_s=60.0) as door:
+            port = door.listener.getsockname()[1]
+            head = (
+                b"POST /api/reports HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+                b"Content-Length: 1000\r\n\r\n{"
+            )
+            slow = [await asyncio.open_connection("127.0.0.1", port) for _ in range(80)]
+            for _, writer in slow:
+                writer.write(head)
+                await writer.drain()
+            async with httpx.AsyncClient(base_url=door.url, timeout=30.0) as client:
+                codes = [(await client.post("/api/reports", json=FRAME)).status_code]
+                codes.append((await client.post("/api/commands", json=HOLD)).status_code)
+            for _, writer in slow:
+                writer.close()
+            return codes
+
+    assert asyncio.run(talk()) == [503, 200]
+    assert run.orders == ["hold"]

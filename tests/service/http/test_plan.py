@@ -1,0 +1,71 @@
+"""The door of a search that is being drawn: what is saved is a search, and nothing starts before."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from service.area import read_area
+from service.config import Settings
+from service.errors import BadInput
+from service.http import Access
+from service.http.plan import Drawing, Plan, create_plan_app
+from tests.service.area.files import box, collection, feature, polygon
+
+from .door import TOKENS, bearer
+
+FIELD = collection(feature(polygon(box(0, 0, 300, 200)), name="field"))
+
+
+def ask(
+    plan: Plan, method: str, path: str, body: Any = None, access: Access | None = None, **headers: str
+) -> httpx.Response:
+    """One request."""
+
+    async def once() -> httpx.Response:
+        transport = httpx.ASGITransport(app=create_plan_app(plan, access=access))
+        async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:8080") as client:
+            return await client.request(method, path, json=body, headers=headers)
+
+    return asyncio.run(once())
+
+
+def test_a_search_is_saved_and_then_started(tmp_path: Path) -> None:
+    plan = Plan(tmp_path / "area.geojson", Settings())
+    assert ask(plan, "POST", "/api/plan/start", {}).status_code == 409
+    assert not plan.started.is_set()
+    assert ask(plan, "GET", "/api/plan").json()["drawn"] is None
+    told = ask(plan, "POST", "/api/plan", FIELD).json()
+    assert told["km2"] == pytest.approx(0.06, rel=0.01)
+    assert read_area(plan.file).polygon.area > 0.0
+    assert ask(plan, "GET", "/api/plan").json()["drawn"]["features"][0]["properties"]["name"] == "field"
+    assert ask(plan, "POST", "/api/plan/start", {}).json() == {"starting": True}
+    assert plan.started.is_set()
+    assert list(tmp_path.iterdir()) == [plan.file]
+
+
+def test_what_is_no_search_leaves_the_file_alone_and_is_one_sentence_without_our_paths(
+    tmp_path: Path,
+) -> None:
+    plan = Plan(tmp_path / "area.geojson", Settings())
+    plan.file.write_text(json.dumps(FIELD), encoding="utf-8")
+    nothing = ask(plan, "POST", "/api/plan", {"type": "FeatureCollection", "features": []})
+    assert nothing.status_code == 422
+    assert nothing.json()["detail"].startswith("area.geojson: ")
+    assert ".plan-" not in nothing.json()["detail"]
+    assert json.loads(plan.file.read_text(encoding="utf-8")) == FIELD
+    with pytest.raises(BadInput, match="writable --out"):
+        Plan(tmp_path / "no" / "a.geojson", Settings()).save(Drawing.model_validate({**FIELD, "name": ""}))
+
+
+def test_drawing_wants_the_command_token(tmp_path: Path) -> None:
+    plan = Plan(tmp_path / "area.geojson", Settings())
+    assert ask(plan, "GET", "/api/plan", access=TOKENS).status_code == 401
+    report = ask(plan, "POST", "/api/plan", FIELD, access=TOKENS, **bearer("report-token-0123456789"))
+    assert report.status_code == 403
+    assert not plan.file.exists()

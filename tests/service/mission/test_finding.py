@@ -1,0 +1,170 @@
+"""What follows when a place is probable enough: by the setting, by the state, and by an operator's word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from service.mission.effects import EnterGuided, Stop, Tell, WriteRow
+from service.mission.news import Judged, Order
+from service.mission.states import State
+from service.rows import FoundRow
+from tests.service.mission.flown import FOUND, LEFT_US, Talk, reached, searching
+
+
+def over(on_found: str) -> Talk:
+    """A search that has just passed the level."""
+    talk = searching({"search": {"on_found": on_found}})
+    talk.sees(found=FOUND, place_probability=FOUND.probability)
+    talk.tick()
+    return talk
+
+
+def said(talk: Talk) -> int:
+    """How often the place was written down."""
+    return sum(isinstance(effect, WriteRow) and isinstance(effect.row, FoundRow) for effect in talk.wanted)
+
+
+@pytest.mark.parametrize("on_found", ["return", "hover", "continue"])
+def test_a_posterior_over_the_level_ends_the_search_unless_it_is_to_continue(on_found: str) -> None:
+    talk = over(on_found)
+    ends = on_found != "continue"
+    assert talk.state == (State.FOUND if ends else State.CONFIRMING)
+    assert talk.core.standing.found == FOUND
+    talk.tick()
+    assert said(talk) == 1  # and not once a tick
+
+
+def test_where_it_was_found_fits_into_one_statustext() -> None:
+    talk = over("return")
+    (told,) = [each.text for each in talk.wanted if isinstance(each, Tell) and "FOUND" in each.text]
+    assert told.startswith(f"search FOUND: {FOUND.lat:.6f}, {FOUND.lon:.6f}")
+    assert len(told) <= 50
+
+
+def test_hovering_over_what_was_found_ends_with_the_energy_for_the_way_home() -> None:
+    talk = over("hover")
+    assert Stop() in talk.tick()
+    assert Stop() not in talk.pass_by(30.0)
+    assert talk.state == State.FOUND
+    talk.shows(battery_percent=18.0)
+    talk.tick()
+    assert (talk.state, talk.core.standing.why_stopped) == (State.RETURNING, "battery at 18 %")
+
+
+def test_what_is_found_is_taken_back_when_more_looks_speak_against_it() -> None:
+    talk = over("continue")
+    talk.sees(found=None, place_probability=0.1)
+    talk.tick()
+    assert (talk.state, talk.core.standing.found) == (State.SEARCHING, None)
+
+
+def test_a_confirmed_place_ends_the_search_whatever_its_probability() -> None:
+    talk = searching({"search": {"on_found": "continue"}})
+    place = replace(FOUND, probability=0.01)
+    talk.sees(confirmed=True, found=place)
+    talk.on(Judged(True, place))
+    assert (talk.state, talk.core.standing.found) == (State.FOUND, place)
+    talk.tick()
+    assert talk.state == State.RETURNING
+
+
+@pytest.mark.parametrize(
+    ("state", "after"),
+    [
+        (State.FOUND, State.SEARCHING),
+        (State.RETURNING, State.SEARCHING),
+        (State.YIELDED, State.YIELDED),
+    ],
+)
+def test_a_rejection_takes_the_search_up_again_where_it_ended_for_that_place(
+    state: State, after: State
+) -> None:
+    talk = over("hover" if state == State.FOUND else "return")
+    if state == State.RETURNING:
+        talk.tick()
+    elif state == State.YIELDED:
+        talk.pilot()
+    assert talk.state == state
+    talk.sees(found=None, place_probability=0.1)
+    talk.on(Judged(False, None))
+    assert talk.core.standing.found is None
+    assert talk.state == after
+
+
+def test_a_rejection_does_not_take_a_search_up_again_that_ended_for_something_else() -> None:
+    talk = over("continue")
+    talk.shows(battery_percent=18.0)
+    talk.tick()
+    assert talk.state == State.RETURNING
+    talk.on(Judged(False, None))
+    assert talk.state == State.RETURNING
+
+
+def test_a_rejection_takes_the_aircraft_back_from_its_autopilot_first() -> None:
+    talk = over("return")
+    talk.tick()
+    talk.shows(**{**LEFT_US, "mode": "RTL"})
+    talk.on(Judged(False, None, ticket=7))
+    assert (talk.doing(), talk.state) == (EnterGuided(), State.RETURNING)
+    talk.shows(guided=True, in_control=True)
+    talk.done()
+    assert talk.state == State.SEARCHING
+
+
+def test_hovering_over_what_was_found_ends_with_an_operators_word() -> None:
+    talk = over("hover")
+    talk.pass_by(10.0)
+    assert talk.state == State.FOUND
+    talk.sees(confirmed=True)
+    talk.on(Judged(True, FOUND))
+    talk.tick()
+    assert talk.state == State.RETURNING
+
+
+def test_a_suspect_in_view_is_hovered_over_where_that_gives_another_look() -> None:
+    talk = searching({"sensor": {"hover_look_s": 2.0}})
+    talk.sees(place_probability=0.6, suspect_in_view=True)
+    talk.tick()
+    assert talk.state == State.CONFIRMING
+    assert Stop() in talk.tick()
+    assert Stop() not in talk.pass_by(3.0)
+
+
+def test_an_operators_return_from_over_the_place_is_obeyed() -> None:
+    talk = reached(State.FOUND, {"search": {"on_found": "hover"}})
+    talk.on(Order("return"))
+    assert talk.state == State.RETURNING
+
+
+@pytest.mark.parametrize(
+    ("state", "after"),
+    [
+        (State.READY, State.DONE),
+        (State.GROUNDED, State.DONE),
+        (State.TAKEOFF, State.DONE),  # it stands yet
+        (State.HOLDING, State.HOLDING),  # an operator holds it: a person's word stands
+        (State.YIELDED, State.YIELDED),
+        (State.RETURNING, State.RETURNING),
+        (State.SEARCHING, State.SEARCHING),  # it sees the same itself
+    ],
+)
+def test_one_of_several_that_does_not_search_flies_no_more_when_the_search_is_over(
+    state: State, after: State
+) -> None:
+    talk = reached(state, {"run": {"next_sortie_within_s": 3600.0}})
+    talk.sees(over="found")
+    talk.tick()
+    assert talk.state == after
+    assert talk.core.standing.settled == (state != State.SEARCHING)
+
+
+def test_one_of_several_whose_detector_is_silent_comes_home_when_the_search_is_over() -> None:
+    talk = searching()
+    talk.silent.add("detector")
+    talk.pass_by(15.0)
+    assert talk.core.standing.causes == {"detector"}
+    talk.sees(over="found")
+    talk.tick()
+    assert (talk.state, talk.core.standing.why_stopped) == (State.RETURNING, "found")

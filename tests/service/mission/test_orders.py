@@ -1,0 +1,119 @@
+"""What an operator's orders do, state by state, and what they need first."""
+
+from __future__ import annotations
+
+import pytest
+
+from service.mission.effects import Answer, DropAction, EnterGuided, Stop, Tell
+from service.mission.news import Order
+from service.mission.orders import ASKED, SIGNAL
+from service.mission.states import TABLE, Event, State
+from service.rows import TransitionRow
+from tests.service.mission.flown import LEFT_US, reached
+
+SO_ALREADY = {
+    (State.HOLDING, "hold"),
+    (State.SEARCHING, "resume"),
+    (State.CONFIRMING, "resume"),
+    (State.RETURNING, "return"),
+    (State.ABORTED, "abort"),
+}
+COMMANDS = {"hold": Event.HOLD, "resume": Event.RESUME, "return": Event.RETURN, "abort": Event.ABORT}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("state", list(State))
+def test_an_order_does_what_the_table_says_and_is_answered(state: State, command: str) -> None:
+    talk = reached(state)
+    did = talk.on(Order(command, 7))
+    if talk.core.doing == EnterGuided() and Answer(7) not in did:
+        talk.shows(guided=True, in_control=True)
+        did = talk.done()
+    assert talk.state == TABLE.get((state, COMMANDS[command]), state)
+    (answer,) = [each for each in did if isinstance(each, Answer)]
+    obeyed = (state, COMMANDS[command]) in TABLE or (state, command) in SO_ALREADY
+    assert answer == Answer(7, "" if obeyed else f"there is nothing to {command} in {state}")
+
+
+@pytest.mark.parametrize("command", ["resume", "return"])
+def test_an_aircraft_is_taken_from_the_pilot_by_an_order_alone_and_first(command: str) -> None:
+    talk = reached(State.YIELDED)
+    talk.on(Order(command, 7))
+    assert (talk.doing(), talk.state) == (EnterGuided(), State.YIELDED)
+    did = talk.failed("the pilot keeps it")
+    assert talk.state == State.YIELDED
+    assert Answer(7, f"{command} failed: the pilot keeps it") in did
+    assert Tell(f"search YIELDED: {command} failed: the pilot keeps it") in did
+
+
+def test_a_pilot_who_takes_over_while_an_order_is_carried_out_wins() -> None:
+    talk = reached(State.HOLDING)
+    talk.shows(**LEFT_US)
+    talk.on(Order("resume", 7))
+    assert talk.doing() == EnterGuided()
+    did = talk.pilot("STABILIZE")
+    assert talk.state == State.YIELDED
+    assert DropAction() in did
+    assert [each.refused for each in did if isinstance(each, Answer)] == [
+        "another order or event came before it was carried out"
+    ]
+    assert talk.core.doing is None
+
+
+def test_a_hold_on_the_autopilots_way_home_takes_it_back_first() -> None:
+    talk = reached(State.RETURNING)
+    talk.shows(**{**LEFT_US, "mode": "RTL"})
+    talk.on(Order("hold"))
+    assert (talk.doing(), talk.state) == (EnterGuided(), State.RETURNING)
+    talk.shows(guided=True, in_control=True)
+    talk.done()
+    assert (talk.state, talk.core.standing.causes) == (State.HOLDING, {"operator"})
+
+
+def test_why_a_run_stopped_is_who_ordered_it() -> None:
+    talk = reached(State.SEARCHING)
+    talk.on(Order("return"))
+    assert talk.core.standing.why_stopped == "the operator asked to return"
+    talk = reached(State.SEARCHING)
+    talk.on(Order("abort"))
+    assert talk.core.standing.why_stopped == "the operator aborted the run"
+
+
+def test_resume_does_not_take_the_aircraft_from_a_hand_on_the_sticks() -> None:
+    talk = reached(State.YIELDED)
+    talk.shows(sticks=0.4)
+    (answer,) = [each for each in talk.on(Order("resume", 7)) if isinstance(each, Answer)]
+    assert "sticks" in answer.refused
+    assert (talk.state, talk.core.doing) == (State.YIELDED, None)
+    assert any(isinstance(each, Tell) and "sticks" in each.text for each in talk.wanted)
+    talk.shows(sticks=0.02)
+    talk.on(Order("resume", 8))
+    assert talk.doing() == EnterGuided()
+
+
+def test_a_hold_in_the_climb_stops_it() -> None:
+    talk = reached(State.TAKEOFF)
+    talk.shows(landed_state="takeoff", armed=True, guided=False, mode="AUTO_TAKEOFF")
+    talk.on(Order("hold", 7))
+    assert talk.doing() == EnterGuided()
+    talk.shows(guided=True, landed_state="in_air", alt_home_m=6.0, alt_amsl_m=406.0)
+    did = talk.done()
+    assert talk.state == State.HOLDING
+    assert Stop() in did
+
+
+def test_a_return_on_the_ground_leaves_the_mode_that_the_pilot_chose() -> None:
+    talk = reached(State.TAKEOFF)
+    talk.pilot("STABILIZE")
+    assert EnterGuided() not in talk.on(Order("return"))
+    talk.tick()
+    assert talk.state == State.DONE
+
+
+def test_ending_the_process_says_nothing_about_the_search() -> None:
+    """The same run can be gone on with, as it was left; an operator's abort ends it."""
+    talk = reached(State.YIELDED)
+    talk.on(Order("leave"))
+    row = TransitionRow(State.YIELDED, Event.ABORT, State.ABORTED, SIGNAL)
+    assert row in talk.rows
+    assert SIGNAL != ASKED  # which is what a run that is over is known by

@@ -1,0 +1,223 @@
+"""From decision to decision: when the planner is asked, what is sent, and what a hit changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from service.ground.relief import Relief
+from service.mavlink.events import Stalled
+from service.mission.effects import DropThought, Reckon, SendWaypoint, SetSpeed, Think
+from service.mission.heights import Leg
+from service.mission.news import Hit
+from service.mission.searching import Levelling
+from service.mission.states import State
+from service.motion import MotionLimits
+from tests.service.mission.flown import GRID, HERE, Talk, place, reached, searching, telemetry
+
+
+def thoughts(talk: Talk) -> list[Think]:
+    """What the planner was asked so far."""
+    return [effect for effect in talk.wanted if isinstance(effect, Think)]
+
+
+def test_the_speed_is_set_before_the_first_waypoint() -> None:
+    talk = reached(State.SEARCHING)
+    talk.tick()
+    assert talk.doing() == SetSpeed(8.0)
+    talk.pass_by(5.0)
+    assert not thoughts(talk)
+    talk.failed("it answered DENIED")  # which is told, and no reason not to search
+    talk.tick()
+    talk.tick()
+    assert len(thoughts(talk)) == 1
+
+
+def test_what_the_parameters_allow_is_told_before_the_first_decision() -> None:
+    talk = reached(State.SEARCHING, most_speed_mps=6.0)
+    talk.tick()
+    talk.tick()
+    assert [each.limits for each in talk.wanted if isinstance(each, Reckon)] == [MotionLimits(6.0, None)]
+    assert not thoughts(talk)
+    talk.shows(most_acceleration_mps2=1.5)
+    talk.tick()
+    assert [each.limits for each in talk.wanted if isinstance(each, Reckon)][1:] == [MotionLimits(6.0, 1.5)]
+
+
+def test_it_flies_to_the_area_first() -> None:
+    lat, lon = place(-40.0, 30.0)
+    talk = reached(State.SEARCHING, lat=lat, lon=lon)
+    talk.tick()
+    talk.done()
+    talk.tick()
+    waypoint = talk.doing()
+    assert isinstance(waypoint, SendWaypoint)
+    assert waypoint.on_way
+    assert not thoughts(talk)
+
+
+def test_a_decision_is_sent_and_the_next_one_asked_for_in_time() -> None:
+    talk = searching()
+    (row, col), _ = talk.core.chart.cell(talk.seen.telemetry)
+    talk.tick()
+    (asked,) = thoughts(talk)
+    assert asked.cell == (row, col)
+    talk.decides((row - 1, col), (row - 2, col))
+    waypoint = talk.doing()
+    assert isinstance(waypoint, SendWaypoint)
+    assert talk.core.chart.cell(talk.seen.telemetry)[0] == (row, col)
+    talk.core.sent(waypoint)
+    talk.done()
+    assert talk.core.flight.waypoints == 1
+    assert talk.core.ahead(talk.seen)[0] == HERE
+    lat, lon = waypoint.point
+    talk.shows(lat=lat, lon=lon)
+    talk.flew()
+    talk.tick()
+    assert len(thoughts(talk)) == 2
+    assert talk.core.flight.steps == 1
+
+
+def above_hills() -> Talk:
+    """A search 30 m above ground whose heights are known, level here."""
+    relief = Relief(np.zeros((110, 110)), 10.0, -400.0, -400.0, 10.0, 400.0)
+    return searching(
+        {"flight": {"altitude_m": 30.0}}, grid=replace(GRID, relief=relief), alt_home_m=30.0, alt_amsl_m=430.0
+    )
+
+
+def legs(talk: Talk) -> list[SendWaypoint]:
+    """Where the aircraft was sent so far."""
+    return [effect for effect in talk.wanted if isinstance(effect, SendWaypoint)]
+
+
+@pytest.mark.parametrize(("up", "sinks"), [(60.0, True), (20.0, False)])
+def test_over_a_cell_that_is_worth_a_look_it_changes_its_height_first(up: float, sinks: bool) -> None:
+    """From 60 or 20 m above the ground, where 30 m is set, a look does not count: seen to circle for three hours."""
+    talk = above_hills()
+    (row, col), _ = talk.core.chart.cell(talk.seen.telemetry)
+    talk.tick()
+    talk.decides((row - 1, col), worth=[(row - 1, col)])
+    talk.core.sent(legs(talk)[-1])
+    talk.done()
+    lat, lon = talk.core.chart.latlon((row - 1, col))
+    talk.shows(lat=lat, lon=lon, alt_home_m=up, alt_amsl_m=400.0 + up)
+    talk.flew()
+    talk.tick()
+    talk.decides((row - 1, col - 1))
+    assert len(legs(talk)) == 2
+    assert legs(talk)[-1].point == pytest.approx((lat, lon))
+    assert legs(talk)[-1].altitude_m == pytest.approx(430.0)
+    talk.core.sent(legs(talk)[-1])
+    talk.done()
+    asked = len(thoughts(talk))
+    talk.pass_by(3.0)
+    assert len(thoughts(talk)) == asked, "it waits for its height"
+    talk.shows(alt_home_m=30.5, alt_amsl_m=430.5)
+    talk.tick()
+    assert thoughts(talk)[-1].cell == (row - 1, col)
+    talk.decides((row - 1, col - 1))
+    assert talk.core.chart.distance(legs(talk)[-1].point, (lat, lon)) > 15.0
+
+
+def test_over_what_is_not_worth_a_look_it_flies_on_as_high_as_it_is() -> None:
+    talk = above_hills()
+    (row, col), _ = talk.core.chart.cell(talk.seen.telemetry)
+    talk.tick()
+    talk.decides((row - 1, col))
+    talk.core.sent(legs(talk)[-1])
+    talk.done()
+    lat, lon = talk.core.chart.latlon((row - 1, col))
+    talk.shows(lat=lat, lon=lon, alt_home_m=60.0, alt_amsl_m=460.0)
+    talk.flew()
+    talk.tick()
+    talk.decides((row - 1, col - 1))
+    assert talk.core.chart.distance(legs(talk)[-1].point, (lat, lon)) > 15.0
+
+
+def test_a_hit_drops_what_was_thought_and_asks_at_once() -> None:
+    talk = searching()
+    talk.tick()
+    did = talk.on(Hit((HERE,), arrived=5.0))
+    assert DropThought() in did
+    assert isinstance(did[-1], Think)
+    (row, col), _ = talk.core.chart.cell(talk.seen.telemetry)
+    talk.decides((row - 1, col))
+    waypoint = talk.doing()
+    assert isinstance(waypoint, SendWaypoint)
+    assert waypoint.hit_at == 5.0
+    assert talk.core.flight.hits == [HERE]
+
+
+def test_what_was_thought_before_the_search_was_left_is_not_flown_after() -> None:
+    talk = searching()
+    talk.pilot()
+    talk.decides((3, 3))
+    assert talk.core.doing is None
+
+
+def test_a_waypoint_that_may_have_been_lost_is_decided_anew_after_a_moment() -> None:
+    talk = searching()
+    talk.tick()
+    (row, col), _ = talk.core.chart.cell(talk.seen.telemetry)
+    talk.decides((row - 1, col))
+    talk.done()
+    asked = len(thoughts(talk))
+    talk.on(Stalled(talk.now, 3.0))
+    talk.tick()
+    assert len(thoughts(talk)) <= asked + 1
+    talk.pass_by(1.5)
+    assert thoughts(talk)[-1].cell == (row, col)
+
+
+@pytest.mark.parametrize(
+    ("searched", "steps", "why"), [(1.0, 0, "searched to POS 100.0%"), (0.1, 40_000, "40000 steps flown")]
+)
+def test_a_search_ends_when_there_is_nothing_more_to_gain(searched: float, steps: int, why: str) -> None:
+    talk = searching()
+    talk.core.flight.steps = steps
+    talk.sees(searched=searched)
+    talk.tick()
+    assert (talk.state, talk.core.standing.why_stopped) == (State.RETURNING, why)
+    assert talk.core.standing.searched
+
+
+def test_a_place_that_stands_out_is_confirmed_or_cleared() -> None:
+    talk = searching()
+    for probability, state in ((0.6, State.CONFIRMING), (0.4, State.CONFIRMING), (0.3, State.SEARCHING)):
+        talk.sees(place_probability=probability)
+        talk.tick()
+        assert talk.state == state
+
+
+def test_an_aircraft_taken_over_low_climbs_straight_up_first() -> None:
+    talk = reached(State.SEARCHING, alt_home_m=3.0, alt_amsl_m=403.0)
+    talk.tick()
+    talk.done()
+    talk.tick()
+    waypoint = talk.doing()
+    assert isinstance(waypoint, SendWaypoint)
+    assert (waypoint.point, waypoint.altitude_m) == (HERE, 415.0)
+    talk.core.sent(waypoint)
+    talk.done()
+    talk.shows(alt_home_m=8.0, alt_amsl_m=408.0)
+    talk.pass_by(5.0)
+    assert not thoughts(talk)
+    talk.shows(alt_home_m=14.0, alt_amsl_m=414.0)
+    talk.pass_by(1.0)
+    assert len(thoughts(talk)) == 1
+
+
+def test_a_climb_that_follows_another_at_once_is_over_when_the_aircraft_stands() -> None:
+    """It coasts uphill while it climbs, and would have to climb again for ever."""
+    fast = telemetry(alt_amsl_m=440.0, velocity_ned_mps=(0.0, 8.0, 0.0))
+    still = telemetry(alt_amsl_m=440.0)
+    climb, sink = Leg(440.0, climbs=True), Leg(440.0, sinks=True)
+    for height in (climb, sink):
+        assert Levelling(height, stands=False).done(fast)
+        assert not Levelling(height, stands=True).done(fast)
+        assert Levelling(height, stands=True).done(still)
+    assert not Levelling(climb, stands=False).done(telemetry(alt_amsl_m=430.0))
+    assert not Levelling(sink, stands=False).done(telemetry(alt_amsl_m=450.0))

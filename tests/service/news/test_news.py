@@ -1,0 +1,199 @@
+"""News from the field: what they say about the ground, and that what is taken back leaves no trace."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from service.area import Grid, build_grid, parse_area
+from service.entries import as_json, understood
+from service.evidence.observe import Observation
+from service.journal import Row
+from service.known import Judgement, Known, Said, Withdrawn
+from service.news.request import EXAMPLES, MOST_CELLS, NewsRequest, news_schema
+from service.rows import NewsRow, WithdrawnRow
+from tests.integration.flight import FIELD
+
+SHIPPED = Path(__file__).parents[3] / "config" / "news.schema.json"
+
+
+def field(cell_m: float = 10.0) -> Grid:
+    return build_grid(parse_area(json.dumps(FIELD).encode(), source="field"), cell_m)
+
+
+GRID = field()
+CELLS = np.argwhere(GRID.searchable)
+
+
+def request(role: str = "clue", kind: str = "Point", **said: Any) -> NewsRequest:
+    """News about the west of the field, half of it when it is a polygon."""
+    coordinates = {
+        "Point": [8.3006, 47.0507],
+        "LineString": [[8.3006, 47.0500], [8.3006, 47.0514]],
+        "Polygon": [
+            [[8.2999, 47.049], [8.3013, 47.049], [8.3013, 47.052], [8.2999, 47.052], [8.2999, 47.049]]
+        ],
+    }[kind]
+    usual: dict[str, Any] = {"pod": 0.8} if role == "searched" else {"bayes_factor": 10.0}
+    if role == "clue" and kind != "Polygon":
+        usual["sigma_m"] = 30.0
+    geometry = {"type": kind, "coordinates": coordinates}
+    feature = {"type": "Feature", "geometry": geometry, "properties": {"role": role, **usual, **said}}
+    return NewsRequest.model_validate(feature)
+
+
+def look(cell: int, *, hit: bool = False) -> Observation:
+    at = CELLS[cell % len(CELLS)].reshape(1, 2)
+    return Observation(at, np.array([hit]), np.array([0.9]), np.array([0.95]), np.array([True]))
+
+
+def known(*said: Said) -> Known:
+    whole = Known(GRID, 0.9, 0.95)
+    for each in said:
+        whole.take(each)
+    return whole
+
+
+def test_a_clue_in_a_polygon_multiplies_the_odds_there_by_its_bayes_factor() -> None:
+    news = request(kind="Polygon").news(GRID, "a")
+    before, after = known().belief.probability(), known(news).belief.probability()
+    inside = np.zeros(GRID.frame.shape, dtype=bool)
+    inside[news.cells[:, 0], news.cells[:, 1]] = news.values == 10.0
+    outside = GRID.searchable & (before > 0.0)
+    outside[news.cells[:, 0], news.cells[:, 1]] = False
+    assert inside.sum() > 50
+    assert outside.sum() > 50
+    odds = (after[inside] / before[inside]).mean() / (after[outside] / before[outside]).mean()
+    assert odds == pytest.approx(10.0)
+    assert after.sum() + known(news).belief.outside == pytest.approx(1.0)
+
+
+def test_a_clue_at_a_point_or_a_line_falls_off_with_the_distance() -> None:
+    for kind in ("Point", "LineString"):
+        news = request(kind=kind).news(GRID, "a")
+        middle = GRID.frame.to_metres([(47.0507, 8.3006)])[0]
+        metres = (news.cells[:, ::-1] + 0.5) * GRID.frame.cell_m - middle
+        away = np.hypot(*metres.T)
+        near = news.values[np.argmin(away)]
+        assert 9.0 < near <= 10.0
+        if kind == "Point":
+            assert np.allclose(news.values, 1.0 + 9.0 * np.exp(-0.5 * (away / 30.0) ** 2))
+
+
+def test_ground_that_others_have_searched_counts_as_searched_and_moves_the_target_elsewhere() -> None:
+    news = request("searched", "Polygon").news(GRID, "a")
+    before, after = known(), known(news)
+    share = float(before.belief.mass_at(news.cells) @ (news.values / 0.8))
+    assert after.record.pos == pytest.approx(0.8 * share)
+    expected = before.belief.probability()
+    expected[news.cells[:, 0], news.cells[:, 1]] *= 1.0 - news.values
+    expected /= expected.sum() + before.belief.outside
+    assert np.allclose(after.belief.probability(), expected)
+
+
+def test_what_was_seen_before_a_clue_counts_as_it_does_after_it() -> None:
+    news = request().news(GRID, "a")
+    looks = [look(each) for each in range(0, 200, 3)]
+    first, last = known(news, *looks), known(*looks, news)
+    assert first.belief.digest() == last.belief.digest()
+    assert first.record.pos == last.record.pos
+
+
+SAYINGS = st.lists(
+    st.one_of(
+        st.tuples(st.just("look"), st.integers(0, 10_000), st.booleans()),
+        st.tuples(st.just("judged"), st.integers(0, 10_000), st.booleans()),
+        st.tuples(st.sampled_from(["clue", "searched"]), st.floats(0.05, 0.95), st.just(True)),
+    ),
+    min_size=1,
+    max_size=12,
+)
+
+
+@given(sayings=SAYINGS, taken_back=st.data())
+@settings(max_examples=60, deadline=None)
+def test_news_that_are_taken_back_leave_no_trace_to_the_last_bit(sayings: list[Any], taken_back: Any) -> None:
+    """Whatever else was said before, between and after."""
+    said: list[Said] = []
+    never: list[Said] = []
+    for number, (what, value, flag) in enumerate(sayings):
+        each: Said
+        if what in ("clue", "searched"):
+            how = {"pod": value} if what == "searched" else {"bayes_factor": 1.5 + 20.0 * value}
+            each = request(what, "Polygon", **how).news(GRID, f"news-{number}")
+            back = taken_back.draw(st.booleans())
+            said += [each, Withdrawn(f"news-{number}")] if back else [each]
+            never += [] if back else [each]
+            continue
+        if what == "look":
+            each = look(value, hit=flag)
+        else:
+            each = Judgement(tuple(CELLS[value % len(CELLS)].tolist()), look(value, hit=flag), flag)
+        said.append(each)
+        never.append(each)
+    whole, other = known(*said), known(*never)
+    assert whole.belief.digest() == other.belief.digest()
+    assert whole.record.pos == other.record.pos
+    assert whole.confirmed == other.confirmed
+    assert [news.id for news in whole.news] == [news.id for news in other.news]
+
+
+def test_a_copy_goes_its_own_way() -> None:
+    news = request().news(GRID, "a")
+    whole = known(news)
+    twin = whole.copy()
+    twin.take(Withdrawn("a"))
+    assert [each.id for each in whole.news] == ["a"]
+    assert twin.belief.digest() == known().belief.digest() != whole.belief.digest()
+
+
+def test_the_journal_keeps_every_bit() -> None:
+    news = request(kind="LineString", words="a track").news(GRID, "a")
+    for row in (NewsRow(news), WithdrawnRow("a")):
+        back = understood(Row(1, 2.0, row.kind, None, json.loads(as_json(row))), Path("journal")).said
+        assert as_json(back) == as_json(row)  # type: ignore[arg-type]
+        if isinstance(back, NewsRow):
+            assert np.array_equal(back.news.values, news.values)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"geometry": {"type": "Point", "coordinates": [47.05, 95.0]}}, "latitude 95 is out of range"),
+        ({"geometry": {"type": "Point", "coordinates": ["a", 1]}}, "is not a position"),
+        ({"properties": {"role": "clue", "bayes_factor": 3}}, "needs a sigma_m in metres"),
+        ({"properties": {"role": "clue", "bayes_factor": 0, "sigma_m": 5}}, "greater than or equal to 0.001"),
+        ({"properties": {"role": "searched", "pod": 0.5}}, "is a Polygon or a MultiPolygon, not a Point"),
+        ({"properties": {"role": "rumour"}}, "does not match any of the expected tags"),
+        ({"bbox": []}, "Extra inputs are not permitted"),
+    ],
+)
+def test_news_that_cannot_be_is_refused_in_words(change: dict[str, Any], words: str) -> None:
+    feature = {**EXAMPLES["a clue at a point"], **change}
+    with pytest.raises(ValidationError, match=words):
+        NewsRequest.model_validate(feature)
+
+
+def test_news_about_no_ground_that_is_searched_or_about_too_much_is_refused() -> None:
+    far = NewsRequest.model_validate(EXAMPLES["a clue at a point"])
+    with pytest.raises(Exception, match="no ground that is searched"):
+        far.news(GRID, "a")
+    assert MOST_CELLS >= 100_000
+
+
+def test_the_shipped_schema_is_the_one_that_is_checked_and_its_examples_are_good() -> None:
+    schema = news_schema()
+    assert json.loads(SHIPPED.read_text(encoding="utf-8")) == schema, (
+        "roisearch-service schema news > config/news.schema.json"
+    )
+    for example in EXAMPLES.values():
+        jsonschema.validate(example, schema)
+        NewsRequest.model_validate(example)

@@ -1,0 +1,236 @@
+"""Several aircraft of one run: whose order, whose report, and when it is over for all."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from roisearch import SearchState
+from service.clock import Clock
+from service.config import Settings
+from service.errors import BadInput
+from service.evidence.counts import Counts
+from service.evidence.reports import OrderReceipt, Receipt, Report
+from service.journal import Journal
+from service.mavlink.telemetry import Telemetry
+from service.mission.mission import Mission
+from service.mission.standing import Terms
+from service.mission.states import FINAL, State
+from service.search import Search
+from service.squad import Squad
+from tests.service.mission.flown import CELL_M, FOUND, GRID, reached
+
+SETTINGS = Settings.model_validate(
+    {"sensor": {"cell_m": CELL_M}, "aircraft": [{"name": "north", "sources": ["cam0"]}, {"name": "south"}]}
+)
+
+
+class StandIn:
+    """A mission that does nothing but remember what it was told."""
+
+    def __init__(self, name: str, search: Search, state: State = State.SEARCHING) -> None:
+        self.name, self.search, self.state = name, search, state
+        self.orders: list[str] = []
+        self.wanted_system: int | None = None
+        self.reports: list[Report] = []
+        self.refusal = ""
+        self.judgements: list[bool] = []
+        self.found: object | None = None
+        self.flight = SimpleNamespace(hits=[])
+        self.intake = SimpleNamespace(submit_all=self.take, refuse=self.refuse, counts=Counts())
+        self.called = f"aircraft '{name}': "
+
+    async def order(
+        self, command: str, place: tuple[float, float] | None = None, system_id: int | None = None
+    ) -> OrderReceipt:
+        self.orders.append(command)
+        self.wanted_system = system_id
+        return OrderReceipt(state=self.state, refused=self.refusal or None)
+
+    async def judged(self, *, confirmed: bool) -> OrderReceipt:
+        self.judgements.append(confirmed)
+        return OrderReceipt(state=self.state)
+
+    async def take(self, reports: Sequence[Report]) -> list[Receipt]:
+        self.reports += reports
+        return [Receipt(id=each.id, status="accepted") for each in reports]
+
+    def refuse(self, report: Report, reason: str) -> Receipt:
+        return Receipt(id=report.id, status="refused", reason=reason)
+
+
+def squad(*missions: StandIn, settings: Settings = SETTINGS) -> Squad:
+    """These, as the missions of a run."""
+    every: Any = missions
+    return Squad(every, settings)
+
+
+def two(*states: State) -> tuple[StandIn, StandIn, Squad]:
+    """Two missions, searching unless their states are given, and their squad."""
+    search = Search(GRID, SETTINGS)
+    first, second = states or (State.SEARCHING, State.SEARCHING)
+    north, south = StandIn("north", search, first), StandIn("south", search, second)
+    return north, south, squad(north, south)
+
+
+@pytest.mark.parametrize("command", ["hold", "return", "abort", "finish"])
+def test_an_order_that_names_none_is_for_all(command: str) -> None:
+    north, south, both = two()
+    assert asyncio.run(both.order(command)).refused is None
+    assert north.orders == south.orders == [command]
+
+
+def test_an_order_that_names_one_is_for_that_alone() -> None:
+    north, south, both = two()
+    asyncio.run(both.order("hold", aircraft="south"))
+    assert (north.orders, south.orders) == ([], ["hold"])
+    with pytest.raises(BadInput, match="there is no aircraft 'west'; there is north, south"):
+        asyncio.run(both.order("hold", aircraft="west"))
+
+
+def test_one_that_has_ended_gets_no_more_orders_and_who_refuses_is_named() -> None:
+    north, south, both = two(State.DONE, State.READY)
+    south.refusal = "there is nothing to return in READY"
+    receipt = asyncio.run(both.order("return"))
+    assert north.orders == []
+    assert receipt.refused == "south: there is nothing to return in READY"
+
+
+def test_an_aircraft_is_taken_back_from_its_pilot_by_its_name_only() -> None:
+    north, south, both = two(State.HOLDING, State.YIELDED)
+    assert "name the aircraft" in str(asyncio.run(both.order("resume")).refused)
+    assert north.orders == south.orders == []
+    asyncio.run(both.order("resume", aircraft="south"))
+    assert south.orders == ["resume"]
+
+
+def test_of_several_only_the_one_that_is_named_is_replaced() -> None:
+    north, south, both = two(State.GROUNDED, State.GROUNDED)
+    assert "name the aircraft" in str(asyncio.run(both.order("replace")).refused)
+    assert north.orders == south.orders == []
+    assert asyncio.run(both.order("replace", aircraft="south", system_id=7)).refused is None
+    assert (north.orders, south.orders, south.wanted_system) == ([], ["replace"], 7)
+
+
+def test_a_word_on_a_place_is_believed_once_and_told_to_all() -> None:
+    north, south, both = two()
+    south.found = FOUND
+    asyncio.run(both.order("reject"))
+    assert (south.orders, south.judgements) == (["reject"], [])
+    assert (north.orders, north.judgements) == ([], [False])
+
+
+def report(number: int, **more: Any) -> Report:
+    """A frame that shows nothing."""
+    return Report(id=f"r{number}", captured_at=1000.0, **more)
+
+
+def test_a_report_goes_to_the_aircraft_that_it_names_or_that_its_source_is_paired_with() -> None:
+    north, south, both = two()
+    sent = [report(1, aircraft="south"), report(2, source="cam0"), report(3, source="cam0", aircraft="south")]
+    receipts = asyncio.run(both.submit_all(sent))
+    assert [each.id for each in receipts] == ["r1", "r2", "r3"]
+    assert [each.id for each in north.reports] == ["r2"]
+    assert [each.id for each in south.reports] == ["r1", "r3"]
+
+
+def test_a_report_of_nobody_knows_whom_is_refused_with_what_would_be_right() -> None:
+    north, south, both = two()
+    unnamed, unknown = asyncio.run(both.submit_all([report(1), report(2, aircraft="west")]))
+    assert unnamed.status == unknown.status == "refused"
+    assert unnamed.reason == (
+        'it does not say of which aircraft it is: add "aircraft", one of "north", "south", or put the source '
+        "'detector' into the sources of an aircraft in the settings"
+    )
+    assert unknown.reason == 'there is no aircraft \'west\'; there is "north", "south"'
+    assert north.reports == south.reports == []
+
+
+def test_of_the_only_aircraft_is_every_report() -> None:
+    settings = Settings.model_validate({"sensor": {"cell_m": CELL_M}})
+    only = StandIn("", Search(GRID, settings))
+    receipts = asyncio.run(squad(only, settings=settings).submit_all([report(1), report(2, aircraft="1")]))
+    assert [each.status for each in receipts] == ["accepted", "accepted"]
+
+
+def test_the_first_that_has_not_ended_leads_and_the_run_ends_with_the_last() -> None:
+    north, south, both = two(State.DONE, State.SEARCHING)
+    assert both.leading is south  # type: ignore[comparison-overlap]
+    assert not both.ended
+    south.state = State.ABORTED
+    assert both.leading is north  # type: ignore[comparison-overlap]
+    assert both.ended
+
+
+@pytest.mark.parametrize(
+    ("state", "given"), [(State.SEARCHING, False), (State.HOLDING, True), (State.YIELDED, True)]
+)
+def test_one_that_does_not_search_has_given_its_share_back(state: State, given: bool, tmp_path: Path) -> None:
+    search = Search(GRID, SETTINGS, aircraft="north")
+    search.beside("south", SETTINGS)
+    asyncio.run(search.decide(SearchState(GRID.start), [], now=1000.0))
+    talk = reached(state)
+    vehicle: Any = SimpleNamespace(telemetry=talk.seen.telemetry, autopilot=None, events_waiting=False)
+    intake: Any = SimpleNamespace(last_at=0.0, counts=Counts())
+    with contextlib.closing(Journal(tmp_path / "journal.sqlite")) as journal:
+        mission = Mission(
+            talk.core,
+            clock=Clock(),
+            search=search,
+            vehicle=vehicle,
+            journal=journal,
+            make_intake=lambda *_: intake,
+        )
+        mission.map_changed()
+    assert (len(search.common.others.committed("north").when) == 0) == given
+
+
+class Silent(StandIn):
+    """A mission that goes on for as long as it is let, with an aircraft that is not heard any more."""
+
+    def __init__(self, name: str, search: Search, state: State) -> None:
+        super().__init__(name, search, state)
+        self.clock = Clock(200.0)
+        self.vehicle = SimpleNamespace(telemetry=Telemetry())
+        self.core = SimpleNamespace(terms=Terms())
+        self.gone = asyncio.Event()
+
+    async def run(self) -> None:
+        if self.state not in FINAL:
+            await self.gone.wait()
+
+    async def leave(self, reason: str) -> None:
+        self.end(State.ABORTED)
+
+    def end(self, state: State) -> None:
+        self.state = state
+        self.gone.set()
+
+
+@pytest.mark.parametrize(("state", "left"), [(State.SEARCHING, True), (State.GROUNDED, False)])
+def test_one_that_is_silent_when_all_others_have_ended_is_left_but_on_the_ground_it_may_be_switched_off(
+    state: State, left: bool
+) -> None:
+    search = Search(GRID, SETTINGS)
+    north, south = Silent("north", search, State.DONE), Silent("south", search, state)
+
+    async def run() -> None:
+        looks, ticking = [0], north.clock.sleep
+
+        async def sleep(seconds: float) -> None:  # of who looks at them
+            looks[0] += 1
+            if looks[0] == 5:
+                south.end(State.DONE)
+            await ticking(seconds)
+
+        north.clock.sleep = sleep  # type: ignore[method-assign]
+        await squad(north, south).run()
+
+    asyncio.run(run())
+    assert (south.state == State.ABORTED) == left

@@ -1,0 +1,61 @@
+"""Where a search stands: one type for live and replay, and the schema that the door shows of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+from pydantic import TypeAdapter
+
+from service.clock import Clock
+from service.config import Settings
+from service.evidence.cover import sensors_over
+from service.http import create_app
+from service.search import Search
+from service.survey import AREA, survey
+from service.view.live import RunView
+from service.view.replay import ReplayView
+from service.view.state import RunState
+from tests.service.export.recorded import SETTINGS, record
+from tests.service.http.door import FakeRun
+
+KNOWN_LIVE_ALONE = {"flight_left_s", "battery_percent", "battery_doubt", "link", "detector", "wind"}
+"""What a journal does not keep."""
+
+
+def states(folder: Path) -> tuple[RunState, RunState]:
+    """Of a live run that has not begun yet, and of one that is over, on the same ground."""
+    view = ReplayView(record(folder, found=True))
+    settings: Settings = SETTINGS
+    area, grid = survey(folder / AREA, None, settings)
+    live = RunView(area, Search(grid, settings), sensors_over(grid, settings), settings, Clock(1.0))
+    return live.state(), view.state()
+
+
+def test_live_and_replay_tell_the_same_fields_and_differ_in_what_is_unknown(tmp_path: Path) -> None:
+    live, replay = states(tmp_path / "run")
+    assert list(live) == list(replay)
+    for name, value in replay.items():
+        if name != "mode":  # of which this journal happens to tell nothing
+            assert (value is None) == (name in KNOWN_LIVE_ALONE), name
+    for state in (live, replay):
+        TypeAdapter(RunState).validate_python(state, strict=True)
+
+
+def test_the_openapi_document_has_the_schema_of_the_state_and_it_holds(tmp_path: Path) -> None:
+    api = create_app(FakeRun()).openapi()
+    answer = api["paths"]["/api/state"]["get"]["responses"]["200"]["content"]["application/json"]
+    assert answer["schema"] == {"$ref": "#/components/schemas/RunState"}
+    schema = {"components": api["components"], **answer["schema"]}
+    for state in states(tmp_path / "run"):
+        jsonschema.validate(json.loads(json.dumps(state)), schema)
+
+
+def test_steps_are_cells_flown_in_a_replay_too(tmp_path: Path) -> None:
+    folder = record(tmp_path / "run", found=True)
+    view = ReplayView(folder)
+    flown = view.rows
+    assert view.state()["steps"] > 0  # though its planner has journalled no decision
+    assert view.decisions(10) == []
+    assert view.state()["steps"] < len(flown)

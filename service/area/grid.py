@@ -155,9 +155,9 @@ class Grid:
             BadInput: it leaves nothing to fly over, closes the way from the launch point, or has too many corners.
         """
         where = Where("the exclusion")
-        flat = shapely.union(self.keep_out.core, self.frame.flatten(shape))
+        flat = shapely.union(self.keep_out.core.shape, self.frame.flatten(shape))
         blocked = route.keep_out_of(flat, self.clearance_m)
-        allowed = self.flyable & ~shapely.intersects(blocked.zone, cell_squares(self.frame))
+        allowed = self.flyable & ~shapely.intersects(blocked.zone.prepared, cell_squares(self.frame))
         if not allowed.any():
             raise where.bad("it leaves no cell to fly over; make it smaller")
         flyable, _, notes = _reachable_part(self.frame, allowed, self.prior, blocked, self.launch, where)
@@ -241,7 +241,7 @@ def build_grid(
 
     blocked = route.keep_out(frame, area.exclusions, clearance_m)
     centres = shapely.centroid(squares)
-    clear = ~shapely.intersects(blocked.zone, squares)
+    clear = ~shapely.intersects(blocked.zone.prepared, squares)
     outline = frame.flatten(area.polygon)
     allowed = clear & shapely.dwithin(outline, centres, margin)
     crossed: tuple[str, ...] = ()
@@ -344,7 +344,7 @@ def _reachable_part(
         notes += (f"The area file has no launch point; the search starts from {lat:.6f}, {lon:.6f}.",)
     else:
         home = frame.to_metres([launch])[0]
-        if shapely.intersects_xy(blocked.zone, *home):
+        if shapely.intersects_xy(blocked.zone.prepared, *home):
             raise where.bad("the launch point lies in an exclusion or too near to one; move it away")
         for label in best_first:
             part = labels == label

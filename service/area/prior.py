@@ -11,6 +11,7 @@ from service.area.frame import BoolArray, GridFrame
 from service.area.geojson import Where
 from service.area.model import RING_MASS, LinePrior, PointPrior, Prior, RingPrior, SearchArea, ring_edges
 from service.area.projection import FloatArray
+from service.area.zone import Zone
 
 
 def cell_squares(frame: GridFrame) -> shapely.Geometry:
@@ -21,7 +22,7 @@ def cell_squares(frame: GridFrame) -> shapely.Geometry:
 
 def covered_fraction(squares: shapely.Geometry, ground: shapely.Geometry) -> FloatArray:
     """How much of each square [rows, cols] a flat geometry covers, float 0..1 [rows, cols]."""
-    shapely.prepare(ground)
+    ground = Zone(ground).prepared
     touched = shapely.intersects(ground, squares)
     full = touched & shapely.contains_properly(ground, squares)
     fraction = full.astype(np.float64)

@@ -16,6 +16,7 @@ import shapely
 from service.area.frame import BoolArray, GridFrame
 from service.area.model import Exclusion
 from service.area.projection import FloatArray
+from service.area.zone import Zone
 from service.errors import BadInput
 from service.geometry import LatLon
 
@@ -47,19 +48,19 @@ class KeepOut:
         core: the exclusions as drawn.
     """
 
-    zone: shapely.Geometry
+    zone: Zone
     corners: FloatArray
     shell: shapely.Geometry
-    core: shapely.Geometry
+    core: Zone
 
     def clear(self, start: FloatArray, ends: FloatArray) -> BoolArray:
         """Which straight legs from a point [2] to points [k, 2] stay outside the zone, bool [k]."""
         legs = np.stack([np.broadcast_to(start, ends.shape), ends], axis=1)
-        return np.asarray(~shapely.intersects(self.zone, shapely.linestrings(legs)), dtype=np.bool_)
+        return np.asarray(~shapely.intersects(self.zone.prepared, shapely.linestrings(legs)), dtype=np.bool_)
 
     def way_out(self, point: FloatArray) -> FloatArray:
         """The point itself [2], or when it is in the zone the nearest point outside."""
-        if not shapely.intersects_xy(self.zone, *point):
+        if not shapely.intersects_xy(self.zone.prepared, *point):
             return point
         edge = shapely.boundary(self.shell)
         nearest = shapely.shortest_line(shapely.Point(point), edge)
@@ -94,10 +95,10 @@ def keep_out_of(flat: shapely.Geometry, clearance_m: float) -> KeepOut:
             f"the exclusions have {drawn} corners, and {len(corners)} when drawn to {_TOLERANCES_M[-1]:g} m; "
             f"a way around more than {_MOST_CORNERS} is not found in time, so draw fewer or simpler ones"
         )
-    shapely.prepare(zone)
     corners = np.unique(corners, axis=0)
-    outside = ~shapely.intersects_xy(zone, corners[:, 0], corners[:, 1])
-    return KeepOut(zone, corners[outside], shapely.buffer(flat, clearance_m + _SPARE_M), flat)
+    around = Zone(zone)
+    outside = ~shapely.intersects_xy(around.prepared, corners[:, 0], corners[:, 1])
+    return KeepOut(around, corners[outside], shapely.buffer(flat, clearance_m + _SPARE_M), Zone(flat))
 
 
 def shortest_route(blocked: KeepOut, start: FloatArray, end: FloatArray) -> list[FloatArray] | None:
@@ -144,8 +145,8 @@ def leg_is_clear(frame: GridFrame, blocked: KeepOut, start: LatLon, end: LatLon)
 def leads_out(frame: GridFrame, blocked: KeepOut, start: LatLon, end: LatLon) -> bool:
     """Whether a straight leg leaves the zone that it begins in by about the nearest way, and stays outside."""
     points = frame.to_metres([start, end])
-    inside = shapely.intersection(blocked.zone, shapely.LineString(points))
-    begins, ends = shapely.intersects_xy(blocked.zone, points[:, 0], points[:, 1])
+    inside = shapely.intersection(blocked.zone.shape, shapely.LineString(points))
+    begins, ends = shapely.intersects_xy(blocked.zone.prepared, points[:, 0], points[:, 1])
     nearest = shapely.distance(shapely.Point(points[0]), shapely.boundary(blocked.shell))
     about = inside.length <= _ABOUT * nearest + _SPARE_M
     return bool(begins and not ends and inside.geom_type == "LineString" and about)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ctypes
+import faulthandler
 import logging
 import os
 import signal
@@ -100,6 +101,8 @@ async def _beat(channel: Channel) -> None:
 
 def main() -> None:
     """Serve the doors that the first two arguments describe."""
+    if sys.stderr is not None:
+        faulthandler.enable()
     parent = os.getppid()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     with contextlib.suppress(OSError):  # where a sandbox does not let us, the kernel's shares are equal

@@ -11,6 +11,7 @@ import shapely
 
 from service.area.frame import GridFrame
 from service.area.projection import FloatArray
+from service.area.zone import Zone
 from service.errors import BadInput
 from service.geometry import LatLon
 from service.ground.raster import Model, Patch, is_there
@@ -90,8 +91,9 @@ def check_covered(relief: Relief, zone: shapely.Geometry, files: Sequence[str]) 
     left = max(0, math.ceil((west - relief.west_m) / relief.step_m))
     right = min(cols, math.floor((east - relief.west_m) / relief.step_m) + 1)
     y, x = np.mgrid[top : max(top, bottom), left : max(left, right)]
-    shapely.prepare(zone)
-    inside = shapely.contains_xy(zone, relief.west_m + x * relief.step_m, relief.north_m + y * relief.step_m)
+    inside = shapely.contains_xy(
+        Zone(zone).prepared, relief.west_m + x * relief.step_m, relief.north_m + y * relief.step_m
+    )
     missing = np.isnan(relief.heights[y[inside], x[inside]])
     if missing.any():
         raise BadInput(

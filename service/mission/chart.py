@@ -46,7 +46,9 @@ class Chart:
     def fence(self, home: LatLon, margin_m: float) -> Fence:
         """The fence of a search that starts and lands at the launch point or at `home`."""
         bases = [self.metres(self.grid.launch), self.metres(home)]
-        return Fence.around(self.grid.outline, bases, self.grid.keep_out.zone, self.frame.cell_m, margin_m)
+        return Fence.around(
+            self.grid.outline, bases, self.grid.keep_out.zone.shape, self.frame.cell_m, margin_m
+        )
 
     def cell(self, t: Telemetry) -> tuple[Cell, bool]:
         """The cell under the aircraft (the nearest one when it is off the grid), and whether it is on it."""
@@ -89,11 +91,11 @@ class Chart:
 
     def too_near(self, point: LatLon) -> bool:
         """Over an exclusion, or within its clearance, where no leg of the search may begin."""
-        return bool(shapely.intersects_xy(self.grid.keep_out.zone, *self.metres(point)))
+        return bool(shapely.intersects_xy(self.grid.keep_out.zone.prepared, *self.metres(point)))
 
     def excluded(self, point: LatLon) -> bool:
         """Over an exclusion."""
-        return bool(shapely.contains_xy(self.grid.keep_out.core, *self.metres(point)))
+        return bool(shapely.contains_xy(self.grid.keep_out.core.prepared, *self.metres(point)))
 
     def route(self, start: LatLon, goal: LatLon) -> list[LatLon]:
         """The way to `goal` around the exclusions; straight there when they leave none."""

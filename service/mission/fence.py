@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import shapely
 
+from service.area.zone import Zone
 from service.config import FlightSettings
 from service.geometry import Metres
 
@@ -27,8 +28,8 @@ _SLACK_M = 2.0
 class Fence:
     """The two zones: `search` while searching, `way` on the way from and to the area."""
 
-    search: shapely.Geometry
-    way: shapely.Geometry
+    search: Zone
+    way: Zone
 
     @classmethod
     def around(
@@ -56,29 +57,26 @@ class Fence:
         while between := [part for part in ahead if part.intersects(way)]:
             way = shapely.union_all([way, *(part.buffer(_DETOUR_M) for part in between)]).convex_hull
             ahead = [part for part in ahead if not any(part is each for each in between)]
-        search = outline.buffer(margin)
-        shapely.prepare(search)
-        shapely.prepare(way)
-        return cls(search, way)
+        return cls(Zone(outline.buffer(margin)), Zone(way))
 
-    def zone(self, *, on_way: bool) -> shapely.Geometry:
+    def zone(self, *, on_way: bool) -> Zone:
         """The zone that counts now."""
         return self.way if on_way else self.search
 
     def leg_objection(self, here: Metres, there: Metres, *, on_way: bool) -> str:
         """Why a leg must not be flown, as a sentence's end, or nothing."""
         zone, name = self.zone(on_way=on_way), self.name(on_way=on_way)
-        if not shapely.contains_xy(zone, *there):
+        if not shapely.contains_xy(zone.prepared, *there):
             return f"lies outside {name}"
-        outside = shapely.difference(shapely.LineString([here, there]), zone)
+        outside = shapely.difference(shapely.LineString([here, there]), zone.shape)
         if outside.is_empty:
             return ""
-        leads_in = outside.geom_type == "LineString" and not shapely.contains_xy(zone, *here)
+        leads_in = outside.geom_type == "LineString" and not shapely.contains_xy(zone.prepared, *here)
         return "" if leads_in else f"lies behind ground outside {name}"
 
     def outside_m(self, here: Metres, *, on_way: bool) -> float:
         """How far outside the zone a place lies, in metres; 0 inside."""
-        return float(shapely.distance(self.zone(on_way=on_way), shapely.Point(here)))
+        return float(shapely.distance(self.zone(on_way=on_way).shape, shapely.Point(here)))
 
     @staticmethod
     def name(*, on_way: bool) -> str:

@@ -30,6 +30,14 @@ def test_the_help_fits_a_screen_and_names_every_flag_and_command() -> None:
     assert "--area config/area.geojson" in said
 
 
+def test_a_process_that_a_library_ends_says_where() -> None:
+    crash = "import os, signal, service.cli\nservice.cli.main = lambda: os.kill(os.getpid(), signal.SIGSEGV)\n"
+    start = "import service.__main__\nservice.__main__.main()"
+    done = subprocess.run([sys.executable, "-c", crash + start], capture_output=True, text=True)
+    assert done.returncode == -11
+    assert "Fatal Python error" in done.stderr
+
+
 @pytest.mark.parametrize("word", ["", *COMMANDS])
 def test_help_comes_before_anything_heavy_is_imported(word: str) -> None:
     heavy = ["numpy", "scipy", "numba", "matplotlib", "fastapi", "pymavlink", "skimage", "rasterio"]

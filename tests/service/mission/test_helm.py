@@ -84,7 +84,7 @@ def test_a_leg_may_be_aimed_where_the_search_may_be(point: tuple[float, float], 
 
 def test_no_leg_is_aimed_into_an_exclusion_or_near_to_one() -> None:
     built, chart = helm(), Chart(GRID)
-    zone = GRID.keep_out.zone.representative_point()
+    zone = GRID.keep_out.zone.shape.representative_point()
     inside = GRID.frame.from_metres(np.array([[zone.x, zone.y]]))[0]
     assert chart.too_near((float(inside[0]), float(inside[1])))
     assert not built.allows((float(inside[0]), float(inside[1])))

@@ -69,6 +69,20 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     return OneFlies(config, log)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A flight that fails is flown once more: it keeps time with five processes on a machine that others use, too."""
+    for item in items:
+        if item.nodeid.startswith((*FLIGHTS, *LATE_FLIGHTS)):
+            item.add_marker(pytest.mark.flaky(reruns=1))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Whoever reads the output of a run that passed sees what was flown twice, and why."""
+    for first in terminalreporter.stats.get("rerun", []):
+        terminalreporter.write_sep("=", f"FLOWN TWICE: {first.nodeid}", yellow=True)
+        terminalreporter.write_line(first.longreprtext)
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """In CI a test that is skipped, for whatever part is missing, is a failure."""
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")

@@ -53,6 +53,8 @@ from service.mavlink.texts import text_messages
 _AUTOPILOT = mavlink.MAV_COMP_ID_AUTOPILOT1
 _V2_START = b"\xfd"
 _ARMS = (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF)
+_STOP_ARRIVES_S = 10.0
+"""So long a stop may be on its way over a bad radio."""
 
 
 class LinkCore(LinkState):
@@ -188,8 +190,8 @@ class LinkCore(LinkState):
         if reason is not None or self.autopilot is None:
             raise NotPermitted(f"no stop was sent: {reason}")
         self._watch.clear()
-        self._strangers.start_over()
-        self._brake = self.request(self.autopilot.brake(), now)
+        self._stop = self.autopilot.brake()
+        self._brake = self.request(self._stop, now)
         return self._brake
 
     def request(self, command: Command, now: float, *, ordered: bool = False) -> int:
@@ -358,6 +360,10 @@ class LinkCore(LinkState):
         self._hearing.on_answer()
         if message.command == mavlink.MAV_CMD_DO_REPOSITION:
             assert self.autopilot is not None
+            if (
+                now - self._stop_sent < _STOP_ARRIVES_S
+            ):  # each one that comes ends somewhere else, and is answered
+                self._strangers.start_over()
             self._probe.on_answer(message.result)
             if self.autopilot.refuses_reposition(message.result):
                 self._watch.on_refusal(result_name(message.result))

@@ -124,7 +124,7 @@ class Framer:
             frame = buffer[at : at + length]
             message = self._codec.decode(frame) if frame else None
             trusted = message is not None and self._codec.trusts(frame, message)
-            if message is None or not self._plausible(message, at + length, trusted):
+            if message is None or not self._plausible(message, at, at + length, trusted):
                 at += 1
                 self.skipped += 1
                 continue
@@ -134,13 +134,23 @@ class Framer:
         del buffer[:at]
         return messages
 
-    def _plausible(self, message: Message, end: int, trusted: bool) -> bool:
-        """The checksum of an unknown message cannot be checked: its signature is, or its length by what follows."""
+    def _plausible(self, message: Message, start: int, end: int, trusted: bool) -> bool:
+        """The checksum of an unknown message cannot be checked: its signature is, or that another follows and none is
+        in it."""
         if message.get_msgId() >= 0:
             return True
         if self._codec.signer is not None:
             return trusted
-        return end == len(self._buffer) or self._buffer[end] in (_V1, _V2)
+        ends = end == len(self._buffer) or self._buffer[end] in (_V1, _V2)
+        return ends and not any(self._begins(at) for at in range(start + 1, end))
+
+    def _begins(self, at: int) -> bool:
+        """Whether a whole frame of a known message begins here."""
+        if self._buffer[at] not in (_V1, _V2):
+            return False
+        length = _frame_length(self._buffer, at) or 0
+        message = self._codec.decode(self._buffer[at : at + length]) if length else None
+        return message is not None and message.get_msgId() >= 0
 
 
 class Receiver:

@@ -106,6 +106,9 @@ class LinkState:
         self._readiness = Readiness(settings)
         self._text_id = 0
         self._brake: int | None = None
+        self._stop: Command | None = None
+        self._stop_sent = -math.inf
+        """When a stop without a target was sent last, until a target is sent."""
         self._told_of: set[tuple[int, str]] = set()
         """Autopilots that were heard in the place of ours, while it was silent."""
 
@@ -173,6 +176,7 @@ class LinkState:
 
     def _send_target(self, target: Target, now: float) -> None:
         assert self.autopilot is not None
+        self._stop_sent = -math.inf
         self._strangers.sent(target, now)
         message = self.autopilot.reposition(target, self.telemetry.system_id, _AUTOPILOT)
         self._send(message, mavlink.MAV_CMD_DO_REPOSITION)
@@ -214,6 +218,9 @@ class LinkState:
         if command.goal_mode is not None:
             self._control.expect(command.goal_mode, now + self.settings.mode_window_s)
             self._strangers.look_away(now + self.settings.mode_window_s)
+        if command is self._stop:
+            self._stop_sent = now
+            self._strangers.start_over()
         if command.height_m is not None:
             self._control.climb_to(command.height_m)
         if command.number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:

@@ -31,7 +31,9 @@ def test_the_help_fits_a_screen_and_names_every_flag_and_command() -> None:
 
 
 def test_a_process_that_a_library_ends_says_where() -> None:
-    crash = "import os, signal, service.cli\nservice.cli.main = lambda: os.kill(os.getpid(), signal.SIGSEGV)\n"
+    crash = (
+        "import os, signal, service.cli\nservice.cli.main = lambda: os.kill(os.getpid(), signal.SIGSEGV)\n"
+    )
     start = "import service.__main__\nservice.__main__.main()"
     done = subprocess.run([sys.executable, "-c", crash + start], capture_output=True, text=True)
     assert done.returncode == -11

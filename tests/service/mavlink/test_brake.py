@@ -75,6 +75,26 @@ def test_where_it_stops_is_nobodys_target_however_late_it_does() -> None:
     assert len(rig.of(TargetReplaced)) == 1
 
 
+@pytest.mark.parametrize("late_s", [0.2, 3.0])
+def test_each_stop_that_arrives_may_end_somewhere_else(late_s: float) -> None:
+    """It is sent several times; an aircraft that is still braking at the second names another place."""
+    rig = blind("px4")
+    rig.core.brake(rig.now)
+    rig.run(late_s)
+    for number in range(3):
+        rig.say(rig.peer.ack(REPOSITION, mavlink.MAV_RESULT_UNSUPPORTED))
+        rig.peer.target = (NORTH + number * 1e-4, LON, ALT)
+        for _ in range(4):
+            rig.say(rig.peer.position_target(rig.now))
+        rig.run(1.0)
+    assert len(rig.messages("COMMAND_LONG", REPOSITION)) == 3
+    rig.run(3.0)
+    assert rig.of(TargetReplaced) == []
+    rig.peer.target = (NORTH + 9e-4, LON, ALT)  # and this is somebody's
+    rig.run(3.0)
+    assert len(rig.of(TargetReplaced)) == 1
+
+
 @FLAVORS
 def test_a_pilot_who_takes_over_while_it_brakes_wins(flavor: str) -> None:
     rig = blind(flavor)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -106,6 +106,9 @@ def test_any_content_of_a_valid_frame_never_raises(seed: int, message_id: int, p
     noise=st.lists(st.binary(max_size=60), min_size=6, max_size=6),
     cuts=st.lists(st.integers(1, 40), min_size=1, max_size=60),
 )
+@example(
+    noise=[b"", b"", b"\xfeY\x00\x00", bytes(9), bytes(9), bytes(12)], cuts=[1]
+)  # a frame that ends where one begins
 def test_noise_between_frames_never_costs_a_frame(noise: list[bytes], cuts: list[int]) -> None:
     stream = b"".join(n + f for n, f in zip(noise, numbered_frames(6), strict=True))
     chunks, at = [], 0

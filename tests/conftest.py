@@ -24,55 +24,70 @@ def log_as_it_was() -> Iterator[None]:
     log.setLevel(level)
 
 
-FLIGHTS = ("tests/browser/", "tests/integration/")
-"""Files whose tests keep time with other processes: one worker does them one at a time, whatever the other computes."""
-LATE_FLIGHTS = (
-    "tests/conformance/test_over_sockets",
-    "tests/integration/test_exports_of_others",
-    "tests/integration/test_faults_pilot",
-    "tests/integration/test_news",
-    "tests/integration/test_restart",
-    "tests/integration/test_search",
-    "tests/integration/test_sorties",
-    "tests/service/mavlink/test_vehicle",
-    "tests/sim/autopilot/test_mav",
-    "tests/sim/test_bench",
-    "tests/typed/",
-)
-"""Those that the other worker does when it has computed everything: by then all kernels are compiled, and two flights
-at a time do not disturb each other."""
-
-
+FLIGHTS = {
+    "flights": (
+        "tests/browser/",
+        "tests/integration/test_faults_flight",
+        "tests/integration/test_faults_link",
+        "tests/integration/test_faults_position",
+        "tests/integration/test_faults_process",
+        "tests/integration/test_faults_told",
+    ),
+    "more flights": (
+        "tests/conformance/test_over_sockets",
+        "tests/integration/test_detectors",
+        "tests/integration/test_exports_of_others",
+        "tests/integration/test_faults_pilot",
+        "tests/integration/test_lying_detectors",
+        "tests/integration/test_news",
+        "tests/integration/test_restart",
+        "tests/integration/test_search",
+        "tests/integration/test_sorties",
+        "tests/service/mavlink/test_vehicle",
+        "tests/sim/autopilot/test_mav",
+        "tests/sim/test_bench",
+        "tests/typed/",
+    ),
+    "last flights": ("tests/integration/",),
+}
+"""Files whose tests keep time with other processes, and mostly wait: each of these is done by one worker, a test at a
+time, while another computes. They take about as long as each other and as all that is computed."""
 COMPILES = ("tests/roisearch/", "tests/sim/trials/")
-"""Files that need most kernels: begun when the other worker, which flies, has compiled them."""
+"""Files that need most kernels: begun when the flights have compiled them."""
+
+
+def flown_with(nodeid: str) -> str:
+    """Which of `FLIGHTS` a test is of; empty when it does not fly."""
+    return next((name for name, files in FLIGHTS.items() if nodeid.startswith(files)), "")
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With `-n 2`, one worker flies and the other takes a file at a time, and flies at last."""
+    """With `-n 3`, two workers fly and the third takes a file at a time, and flies at last."""
     from xdist.scheduler import LoadScopeScheduling
 
-    class OneFlies(LoadScopeScheduling):
+    class TwoFly(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            file = nodeid.partition("::")[0]
-            if file.startswith(LATE_FLIGHTS):
-                return "late"
-            return "flights" if file.startswith(FLIGHTS) else file
+            return flown_with(nodeid) or nodeid.partition("::")[0]
 
         def _assign_work_unit(self, node: Any) -> None:
-            for last in [file for file in self.workqueue if file.startswith(COMPILES)]:
-                self.workqueue.move_to_end(last)
-            if "late" in self.workqueue:
-                self.workqueue.move_to_end("late")
+            first, second, last = FLIGHTS
+            waiting = self.workqueue
+            for name in [name for name in (second, first) if name in waiting]:
+                waiting.move_to_end(name, last=False)
+            for name in [name for name in waiting if name.startswith(COMPILES)]:
+                waiting.move_to_end(name)
+            if last in waiting:
+                waiting.move_to_end(last)
             super()._assign_work_unit(node)
 
-    return OneFlies(config, log)
+    return TwoFly(config, log)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """A flight that fails is flown once more: it keeps time with five processes on a machine that others use, too."""
     for item in items:
-        if item.nodeid.startswith((*FLIGHTS, *LATE_FLIGHTS)):
+        if flown_with(item.nodeid):
             item.add_marker(pytest.mark.flaky(reruns=1))
 
 

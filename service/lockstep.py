@@ -13,6 +13,7 @@ import mmap
 import os
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,8 @@ GONE_S = 15.0
 """Wall time after which a simulator whose time stands still is not followed any more."""
 LOOK_S = 0.2
 """Wall time after which one whose time stands still is looked after: it may have ended."""
+SLOW_DISK_S = 1.0
+"""Wall time for which simulated time waits for what is being written."""
 _EVERY_S = 0.002
 
 
@@ -75,10 +78,15 @@ class Lockstep:
         """Nobody waits for us any more."""
         self._places[self._own] = 0.0
 
-    async def keep_up(self) -> None:
-        """Say again and again, from the event loop that does the work, that it is not behind."""
+    async def keep_up(self, waits_s: Callable[[], float] = lambda: 0.0) -> None:
+        """Say again and again, from the event loop that does the work, that it is not behind.
+
+        `waits_s` is for how long the work has waited for the disk, in wall time: simulated time waits along, at twenty
+        times the pace half a second would be ten; but not for a disk that would be slow for a real aircraft, too.
+        """
         while True:
-            self.content_for(0.0)
+            if not 0.0 < waits_s() < SLOW_DISK_S:
+                self.content_for(0.0)
             await asyncio.sleep(_EVERY_S)
 
     def _gone(self, still_s: float) -> bool:

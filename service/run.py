@@ -275,7 +275,7 @@ class Service:
                     log.info("listening on %s", door.address)
                     if self.world is not None:
                         await self.world.start_detectors(door.url, list(squad.missions), guest_token)
-                    await self._run_squad(squad)
+                    await self._run_squad(squad, journal)
                 await asyncio.sleep(0.3 if self.world is not None else 0.0)  # let the detector read the end
         except LinkError as error:
             log.error("%s", error)
@@ -339,7 +339,7 @@ class Service:
         self.world = await DemoWorld.start(self.search.grid, self.settings, self.lockstep)
         return self.world.urls
 
-    async def _run_squad(self, squad: Squad) -> None:
+    async def _run_squad(self, squad: Squad, journal: Journal) -> None:
         """Run the missions beside the display; a signal asks them to return, a second one ends them at once."""
         loop = asyncio.get_running_loop()
         orders: set[asyncio.Task[OrderReceipt]] = set()
@@ -361,7 +361,7 @@ class Service:
         beside = [
             asyncio.create_task(show(self.prepared.console, self.view.state)),
             asyncio.create_task(self._watch_world(squad)),
-            *([asyncio.create_task(self.lockstep.keep_up())] if self.lockstep else []),
+            *([asyncio.create_task(self.lockstep.keep_up(journal.behind_s))] if self.lockstep else []),
         ]
         try:
             await squad.run()

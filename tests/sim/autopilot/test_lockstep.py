@@ -44,10 +44,10 @@ class Follower:
         assert self.process.stdout is not None
         assert self.process.stdout.readline()
 
-    def act(self) -> None:
+    def act(self, word: str = "") -> None:
         """Let it do its thing."""
         assert self.process.stdin is not None
-        self.process.stdin.write("\n")
+        self.process.stdin.write(f"{word}\n")
         self.process.stdin.flush()
         self.answers()
 
@@ -87,6 +87,21 @@ def test_time_waits_for_who_follows_and_goes_on_with_it(tmp_path: Path) -> None:
         assert lead.steps(500, SPEEDUP) == 0
         follower.act()
         assert lead.steps(500, SPEEDUP) == AHEAD_STEPS
+
+
+KEEPS_UP = """import asyncio, contextlib
+    with contextlib.suppress(TimeoutError):
+        asyncio.run(asyncio.wait_for(lockstep.keep_up(lambda: float(line)), 0.05))"""
+
+
+def test_time_waits_for_what_is_being_written_but_not_for_a_disk_that_is_slow(tmp_path: Path) -> None:
+    lead, file = leader(tmp_path)
+    with following(file, does=KEEPS_UP) as follower:
+        went = []
+        for behind_s in (0.0, 0.5, 0.0, 1.5):
+            follower.act(str(behind_s))
+            went.append(lead.steps(10 * AHEAD_STEPS, SPEEDUP))
+        assert went == [AHEAD_STEPS, 0, AHEAD_STEPS, AHEAD_STEPS]
 
 
 def test_time_goes_on_in_real_time_too(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ NOT_TO_THE_END = {
     "echo ": "needs that socket: tests/service/doors sends the same",
     "bash .ci/run": TESTS,
     ".venv/bin/ruff": TESTS,
-    ".venv/bin/python -m pytest -n 2": TESTS,
+    ".venv/bin/python -m pytest -n 3": TESTS,
     "ROISEARCH_PICTURES=": "makes the pictures anew",
     "ROISEARCH_TYPES=": "writes a file of the page's anew",
     "python -m tests.fuzz": "needs atheris: tests/fuzz/test_bad_bytes.py tries the same targets",

@@ -60,6 +60,7 @@ class Grid:
         relief: the heights of the ground; None: it is taken as flat.
         target: how the target moves; None: it stands still.
         visibility: float [rows, cols], what a look from above finds there as a share of that in the open; None: all.
+        mobility: float [rows, cols], how well each cell is walked, 0 (not at all) to 1; None: all alike.
     """
 
     frame: GridFrame
@@ -77,6 +78,7 @@ class Grid:
     relief: Relief | None = None
     visibility: FloatArray | None = None
     target: Target | None = None
+    mobility: FloatArray | None = None
 
     @property
     def walk(self) -> "Walk | None":
@@ -86,7 +88,9 @@ class Grid:
         """
         from roisearch import Walk
 
-        return None if self.target is None else Walk(cell_m=self.frame.cell_m, **asdict(self.target))
+        if self.target is None:
+            return None
+        return Walk(cell_m=self.frame.cell_m, mobility=self.mobility, **asdict(self.target))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -147,6 +151,21 @@ class Grid:
                 "what it finds in the open: that needs a ground team.",
             )
         return replace(self, visibility=_frozen(visibility), layout_notes=notes)
+
+    def walked_at(self, area: SearchArea, mobility: FloatArray) -> "Grid":
+        """The same grid where the ground is walked so well, [rows, cols], 0 to 1: the rings of the area's lost persons
+        keep to it, and so does a target that walks.
+
+        Raises:
+            BadInput: a prior has no mass where it can be walked.
+        """
+        squares = cell_squares(self.frame)
+        prior = area_prior(area, self.frame, squares, self.covered, self.searchable, mobility)
+        return replace(self, prior=_frozen(prior), mobility=_frozen(mobility))
+
+    def noting(self, note: str) -> "Grid":
+        """The same grid with one more sentence for the operator."""
+        return replace(self, layout_notes=(*self.layout_notes, note))
 
     def excluding(self, shape: shapely.Geometry) -> "Grid":
         """The same grid with one more exclusion (degrees, x = longitude), which keeps its mass but is not flown over.

@@ -21,6 +21,7 @@ from service.area.route import KeepOut
 from service.errors import BadInput
 from service.geometry import LatLon
 from service.ground.relief import Relief
+from service.places import Coordinates, written
 
 if TYPE_CHECKING:
     from roisearch import Walk
@@ -61,6 +62,7 @@ class Grid:
         target: how the target moves; None: it stands still.
         visibility: float [rows, cols], what a look from above finds there as a share of that in the open; None: all.
         mobility: float [rows, cols], how well each cell is walked, 0 (not at all) to 1; None: all alike.
+        coordinates: how the team writes places, in notes and messages.
     """
 
     frame: GridFrame
@@ -79,6 +81,7 @@ class Grid:
     visibility: FloatArray | None = None
     target: Target | None = None
     mobility: FloatArray | None = None
+    coordinates: Coordinates = "degrees"
 
     @property
     def walk(self) -> "Walk | None":
@@ -179,7 +182,9 @@ class Grid:
         allowed = self.flyable & ~shapely.intersects(blocked.zone.prepared, cell_squares(self.frame))
         if not allowed.any():
             raise where.bad("it leaves no cell to fly over; make it smaller")
-        flyable, _, notes = _reachable_part(self.frame, allowed, self.prior, blocked, self.launch, where)
+        flyable, _, notes = _reachable_part(
+            self.frame, allowed, self.prior, blocked, self.launch, where, self.coordinates
+        )
         start = nearest_flyable(self.frame, flyable, self.launch)
         return replace(
             self,
@@ -211,6 +216,7 @@ def build_grid(
     clearance_m: float = CLEARANCE_M,
     launch: LatLon | None = None,
     max_cells: int = 1_000_000,
+    coordinates: Coordinates = "degrees",
 ) -> Grid:
     """Lay cells over an area.
 
@@ -232,6 +238,7 @@ def build_grid(
         launch: (latitude, longitude) to use instead of the launch point of the file, such as
             the aircraft's home; it may be as far from the area as one in the file.
         max_cells: the largest grid, rows x cols.
+        coordinates: how the team writes places, in notes and messages.
 
     Raises:
         BadInput: cells too small or too large for the area, nothing left to fly over, or the
@@ -274,7 +281,7 @@ def build_grid(
     if not allowed.any():
         raise where.bad(f"the exclusions leave no cell of {cell_m:g} m to fly over; make them smaller")
     chosen = launch or area.launch
-    flyable, home, notes = _reachable_part(frame, allowed, prior, blocked, chosen, where)
+    flyable, home, notes = _reachable_part(frame, allowed, prior, blocked, chosen, where, coordinates)
     return Grid(
         frame=frame,
         prior=_frozen(prior),
@@ -289,6 +296,7 @@ def build_grid(
         layout_notes=crossed + notes,
         clearance_m=clearance_m,
         target=area.target,
+        coordinates=coordinates,
     )
 
 
@@ -316,7 +324,13 @@ def way_home(grid: Grid, start: LatLon, end: LatLon) -> list[LatLon]:
     Raises:
         BadInput: an exclusion closes every way.
     """
-    return route.way(grid.frame, grid.keep_out, start, end)
+    points = route.way(grid.frame, grid.keep_out, start, end)
+    if points is None:
+        raise BadInput(
+            f"no way from {written(start, grid.coordinates)} to {written(end, grid.coordinates)} "
+            "goes around the exclusions; leave a gap between them."
+        )
+    return points
 
 
 def transit_ground(frame: GridFrame, area: SearchArea) -> shapely.Geometry:
@@ -348,6 +362,7 @@ def _reachable_part(
     blocked: KeepOut,
     launch: LatLon | None,
     where: Where,
+    coordinates: Coordinates,
 ) -> tuple[BoolArray, LatLon, tuple[str, ...]]:
     """One connected part (4 neighbours) of the allowed cells, the launch point, and what to tell about it."""
     labels, count = ndimage.label(allowed)
@@ -360,7 +375,8 @@ def _reachable_part(
         cell = np.argwhere(part)[-1]
         lat, lon = frame.to_latlon([cell])[0]
         launch = (float(lat), float(lon))
-        notes += (f"The area file has no launch point; the search starts from {lat:.6f}, {lon:.6f}.",)
+        start = written(launch, coordinates)
+        notes += (f"The area file has no launch point; the search starts from {start}.",)
     else:
         home = frame.to_metres([launch])[0]
         if shapely.intersects_xy(blocked.zone.prepared, *home):

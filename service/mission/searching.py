@@ -137,7 +137,7 @@ class Searching(Phase):
         """Out of another's way, and decide anew from there."""
         self._looking, self._hovering, self._levelling = False, False, None
         self._way = Way([place], climb=False)
-        yield Note(f"makes room for the others at {place[0]:.6f}, {place[1]:.6f}")
+        yield Note(f"makes room for the others at {look.chart.written(place)}")
         yield from self._forget()
         yield from self._way.tick(look)
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.errors import BadInput
+from service.errors import BadInput, Parser
 
 if TYPE_CHECKING:
     from service.area import SearchArea
@@ -23,7 +23,7 @@ kinds: GeoJSON (ours, geojson.io, QGIS), CalTopo and SARTopo exports, KML, KMZ, 
 
 def main(arguments: list[str]) -> int:
     """Print what a file says, and write it as our GeoJSON if asked to; returns 0, or raises BadInput."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="roisearch-service area",
         description="What is understood of an area file: roles, priors and their weights, what was left out and why.",
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -70,7 +70,7 @@ def make_planner(name: str, *, fov: FieldOfView, **options: Any) -> Planner:
             a point field of view, plan by it and to eight neighbours; for the PUCT planners `preset` ("default",
             "paper" or "reference") and any of `PuctSettings`, but for `puct-regions-lite` by default any of
             `LookaheadSettings`, or with such a motion of `TourSettings`; for the others see their classes. One from
-            outside is given of `flyable`, `regions` and `motion` what its constructor takes.
+            outside is given of `flyable`, `regions`, `motion`, `visibility` and `heights` what its constructor takes.
             `visibility` (float [rows, cols], 0 to 1) is how much of the field of view's p_tp a look has at each cell:
             `puct-regions-lite` plans with it by default, the others take all cells alike. `heights` (float
             [rows, cols], metres at which each cell is flown over) belong to `motion`: where climbs and descents take
@@ -83,7 +83,7 @@ def make_planner(name: str, *, fov: FieldOfView, **options: Any) -> Planner:
         try:
             return cast(Planner, make_outside(name, {"fov": fov, **options}))
         except TypeError as error:
-            raise ValueError(f"{name}: {error}") from None
+            raise ValueError(f"the planner '{name}' cannot be made: {error}; see BasePlanner") from None
     if name not in _PLANNERS:
         raise ValueError(f"there is no planner '{name}'; there is {', '.join((*_PLANNERS, *installed()))}")
     if name != _LITE or options.get("preset", "default") != "default":

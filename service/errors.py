@@ -1,5 +1,10 @@
 """Errors that a person can act on."""
 
+from __future__ import annotations
+
+import argparse
+from typing import NoReturn
+
 
 class BadInput(ValueError):
     """What the operator gave cannot be used.
@@ -7,6 +12,14 @@ class BadInput(ValueError):
     The message is one sentence: what is wrong, where (file, feature, value), and what
     would be right. The command line prints it as it is and exits with code 2.
     """
+
+
+class Parser(argparse.ArgumentParser):
+    """The flags of a command: what is wrong with them is one sentence, as every refusal is."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say it, and end with exit code 2."""
+        self.exit(2, f"{self.prog}: {message}; {self.prog} --help tells more\n")
 
 
 def shown(value: object, most: int = 120) -> str:

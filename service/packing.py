@@ -27,6 +27,7 @@ CARRIED = (
     ("sensor", "calibration_file", "calibration"),
     ("sensor", "terrain_file", "terrain"),
     ("ground", "cover_file", "cover"),
+    ("ground", "mobility_file", "mobility"),
 )
 """Settings that name a file, by section and key, and what that file is called in the pack."""
 LEFT_OUT = (*SECRET, ("telling", "tak_ca_file"), ("page", "mbtiles_file"))

@@ -36,7 +36,8 @@ SECRET = (
 )
 """Settings, by section and key, that are secrets or say where one is: they are not written where others may read."""
 _SECRETS = frozenset(f"{section}.{key}" for section, key in SECRET)
-COVER = "ground.cover_file"
+RASTERS = ("cover_file", "mobility_file")
+"""Settings of the ground that may name a raster, or none."""
 FINGERPRINTS = "files"
 """The key of them in a journal; runs of earlier versions have none."""
 
@@ -54,9 +55,9 @@ def fingerprints(folder: Path, settings: Settings) -> dict[str, str]:
     }
     named |= {f"ground.file[{i}]": name for i, name in enumerate(settings.ground.file)}
     files |= {key: Path(name) for key, name in named.items() if name}
-    cover = settings.ground.cover_file
+    rasters = {f"ground.{key}": getattr(settings.ground, key) for key in RASTERS}
     return {key: _fingerprint(path) for key, path in files.items()} | {
-        COVER: _fingerprint(Path(cover)) if cover else ""
+        key: _fingerprint(Path(name)) if name else "" for key, name in rasters.items()
     }
 
 
@@ -65,8 +66,8 @@ def refuse_changed(folder: Path, settings: Settings, begun_with: Mapping[str, st
     if begun_with is None:
         return
     now = fingerprints(folder, settings)
-    if COVER not in begun_with:  # as early runs
-        del now[COVER]
+    for key in {f"ground.{each}" for each in RASTERS} - begun_with.keys():  # as early runs
+        del now[key]
     for key in sorted({*now, *begun_with}):
         if now.get(key, "") != begun_with.get(key, ""):
             what = {"area": str(folder / AREA), "prior": str(folder / PRIOR)}.get(key, key)

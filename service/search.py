@@ -42,6 +42,7 @@ from service.ground.sight import seen_share
 from service.known import Known, Said
 from service.mission.energy import Left
 from service.motion import MotionLimits, limits_note, motion_of, within
+from service.outside import from_outside
 from service.reach import Reach
 from service.reasons import Reason
 from service.redrawing import Sketch, taking
@@ -194,16 +195,17 @@ class Search:
         search = self.settings.search
         if search.planner == KEEPS_ITS_PLAN and self.fov.is_point:
             options = {"iterations": search.iterations, "looks": search.looks_ahead, **options}
-        return make_planner(
-            search.planner,
-            fov=self.fov,
-            flyable=self.grid.flyable,
-            regions=self.regions,
-            visibility=self.visibility,
-            motion=self.motion,
-            heights=self.heights,
-            **options,
-        )
+        with from_outside(search.planner):
+            return make_planner(
+                search.planner,
+                fov=self.fov,
+                flyable=self.grid.flyable,
+                regions=self.regions,
+                visibility=self.visibility,
+                motion=self.motion,
+                heights=self.heights,
+                **options,
+            )
 
     def _make_ending(self) -> None:
         """What plans the end of a battery, on the ground that may be flown over now."""
@@ -299,7 +301,8 @@ class Search:
 
         A plan in seconds is kept and carried on from decision to decision: it is begun without a deadline, here.
         """
-        self.ending.warm_up(progress)
+        with from_outside(self.settings.search.planner):
+            self.ending.warm_up(progress)
         if isinstance(self.planner, InSeconds):
             self.planner.plan(self.belief, SearchState(self.grid.start), self._rng)
 

@@ -22,9 +22,11 @@ def survey(area_file: Path, prior_file: Path | None, settings: Settings) -> tupl
     from service.evidence.sensors import cell_for_all
     from service.ground.cover import visibility_of
     from service.ground.flyable import over_ground
+    from service.ground.mobility import walked
 
     area, _ = read_survey(area_file, settings)
-    grid = build_grid(area, cell_for_all(settings))
+    grid = build_grid(area, cell_for_all(settings), coordinates=settings.run.coordinates)
+    grid = walked(area, grid, settings)
     if prior_file is not None:
         grid = grid.with_prior(read_geotiff_prior(prior_file, grid.frame, grid.covered))
     if (visibility := visibility_of(area, grid, settings)) is not None:

@@ -29,6 +29,7 @@ from roisearch.bounds import expected_time, multi_cell, release, teleport_refere
 from roisearch.planners.base import Progress
 from roisearch.planners.lookahead.planner import LookaheadPlanner
 from roisearch.planners.lookahead.settings import LookaheadSettings
+from service.errors import Parser
 from sim.ruler import Ruler, detection_curve
 from sim.scenario import EQUAL, PAPER_START, PAPER_STEPS, paper_prior
 
@@ -227,7 +228,7 @@ def plot(rows: list[Row], variants: list[str], reference: str, path: Path) -> No
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    p = argparse.ArgumentParser(prog="roisearch-sim ablation", description=__doc__)
+    p = Parser(prog="roisearch-sim ablation", description=__doc__)
     p.add_argument("--variants", default=VARIANTS, help="planners, or settings of the sweep planner, with spaces "
                    f"between (default '{VARIANTS}')")  # fmt: skip
     p.add_argument("--first", type=int, default=5000, help="seed of the first prior (default 5000)")

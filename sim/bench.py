@@ -7,7 +7,6 @@ follows it, while a search is flown in which nothing is found.
 
 from __future__ import annotations
 
-import argparse
 import copy
 import importlib
 import sys
@@ -25,6 +24,7 @@ from roisearch.directions import direction_between
 from roisearch.fov import HEADINGS, MOVES
 from roisearch.planners.puct.presets import settings_for
 from roisearch.watch import LOOKED
+from service.errors import Parser
 from sim.bench_memory import table as memory_table
 from sim.bench_regions import COST_AT_MOST, FEW, LOSS_AT_MOST, MANY, bounded_choice
 from sim.twin import TwinBelief, TwinPlanner
@@ -354,7 +354,7 @@ def main(arguments: list[str]) -> int:
     if arguments and arguments[0] in others:
         code: int = importlib.import_module(others[arguments[0]]).main(arguments[1:])
         return code
-    parser = argparse.ArgumentParser(prog="roisearch-sim bench", description=main.__doc__)
+    parser = Parser(prog="roisearch-sim bench", description=main.__doc__)
     parser.add_argument("--out", type=Path, default=Path("bench"), help="folder for bench.md and bench.png")
     parser.add_argument("--steps", type=int, default=100, help="decisions that the twin flies (default 100)")
     parser.add_argument("--largest", type=int, default=4000, help="side of the largest map (default 4000)")

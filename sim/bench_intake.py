@@ -11,7 +11,6 @@ Lost is a report without a receipt that says so, or that the journal does not ho
 
 from __future__ import annotations
 
-import argparse
 import http.client
 import itertools
 import json
@@ -32,6 +31,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from service.errors import Parser
 
 Report = dict[str, Any]
 RATE_AT_LEAST, P99_AT_MOST_MS = 500.0, 50.0
@@ -377,7 +378,7 @@ def lost(tallies: Sequence[Tally], written: Sequence[str]) -> int:
 
 def main(arguments: list[str]) -> int:
     """Run the benchmark; 1 with `--check` when a target is missed or anything was lost, else 0."""
-    parser = argparse.ArgumentParser(prog="roisearch-sim bench intake", description=main.__doc__)
+    parser = Parser(prog="roisearch-sim bench intake", description=main.__doc__)
     parser.add_argument("--area", type=Path, default=Path("config/areas/mountain-valley.geojson"))
     parser.add_argument("--rate", type=float, default=600.0, help="reports a second, all doors (default 600)")
     parser.add_argument("--seconds", type=float, default=20.0, help="how long (default 20)")

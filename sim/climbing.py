@@ -9,7 +9,6 @@ timed by the same motion with these heights, and so is a survey. No alarms: what
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,6 +22,7 @@ from rich.table import Table
 
 from roisearch import FieldOfView, Motion, make_planner
 from roisearch.decision import Cell
+from service.errors import Parser
 from sim.grounds import GROUNDS, write
 from sim.overground import ALTITUDE_M, CLEARANCE_M, POSITION_ERROR_M, SETTINGS
 from sim.ruler_seconds import How, TimedFlight, fly
@@ -158,7 +158,7 @@ def _tell_flown(folder: Path) -> int:
 
 def main(arguments: list[str]) -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="roisearch-sim climbing", description=__doc__.split("\n")[0])
+    parser = Parser(prog="roisearch-sim climbing", description=__doc__.split("\n")[0])
     parser.add_argument("--grounds", default="slope,ridge", help="which, separated by commas")
     parser.add_argument(
         "--rates", default="settings", choices=sorted(RATES), help="how fast it climbs and sinks"

@@ -23,7 +23,7 @@ from typing import Any
 import httpx
 import numpy as np
 
-from service.errors import BadInput
+from service.errors import BadInput, Parser
 from service.lockstep import Lockstep
 from sim.sight import Point, Sight
 from sim.target import Tour
@@ -196,6 +196,12 @@ def end_with_standard_input() -> None:
     threading.Thread(target=wait, name="attached", daemon=True).start()
 
 
+def _address(text: str) -> str:
+    if not text.startswith(("http://", "https://")):
+        raise argparse.ArgumentTypeError(f"'{text}' is no address; give http://HOST:PORT")
+    return text
+
+
 def _point(text: str) -> Point:
     try:
         lat, lon = (float(part) for part in text.split(","))
@@ -244,11 +250,13 @@ def _sight(file: Path | None, home: Point | None) -> Sight | None:
 
 def main(arguments: list[str]) -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="roisearch-sim detector",
         description="A simulated detector: follows the aircraft through the service's door and reports frames.",
     )
-    parser.add_argument("--service", metavar="URL", required=True, help="where the service listens")
+    parser.add_argument(
+        "--service", metavar="URL", type=_address, required=True, help="where the service listens"
+    )
     parser.add_argument(
         "--target", metavar="LAT,LON", type=_point, help="where the target is (default: nowhere)"
     )

@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
+
+from service.area import read_area
+from service.errors import BadInput
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -16,6 +19,15 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound="DataclassInstance")
 RESULT = "result.json"
 GOES_ON = "With --out, the same command goes on where it was interrupted."
+
+
+def check_areas(parser: argparse.ArgumentParser, areas: Sequence[Path]) -> None:
+    """End in one sentence, before the first flight, when an area file is none."""
+    for area in areas:
+        try:
+            read_area(area)
+        except BadInput as error:
+            parser.error(str(error).rstrip("."))
 
 
 def add_options(parser: argparse.ArgumentParser, each: str, *, speedup: float, patience_s: float) -> None:

@@ -15,7 +15,6 @@ frames close together; how far apart they were is told.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -33,8 +32,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from service.errors import Parser
 from sim import flights_together, overground, sorties_campaign
-from sim.flight_campaign import add_flavors, add_options, seeds_of
+from sim.flight_campaign import add_flavors, add_options, check_areas, seeds_of
 from sim.flight_times import GOALS, Times, times_of
 from sim.progress import Rest, bars
 
@@ -174,7 +174,7 @@ def main(arguments: list[str]) -> int:
         return sorties_campaign.main(arguments)
     if any(word.split("=")[0] == "--aircraft" for word in arguments):
         return flights_together.main(arguments)
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="roisearch-sim flights",
         description=__doc__.split("\n")[0],
         epilog="Other campaigns, each with a --help of its own: --ground (over hills that are hard to fly over), "
@@ -193,6 +193,7 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--config", type=Path, help="settings file for the service")
     options = parser.parse_args(arguments)
+    check_areas(parser, options.areas)
     flights = [
         SearchFlight(area, flavor, seed, planner, not options.no_target)
         for seed in seeds_of(options)

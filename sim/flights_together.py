@@ -9,7 +9,6 @@ A flight is good when it ends FOUND, where the target is, with no two aircraft t
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import tempfile
@@ -24,9 +23,10 @@ import httpx
 import numpy as np
 from rich.console import Console
 
+from service.errors import Parser
 from sim.autopilot.control import Control
 from sim.autopilot.process import AutopilotProcess
-from sim.flight_campaign import add_options, seeds_of
+from sim.flight_campaign import add_options, check_areas, seeds_of
 from sim.progress import Rest
 from sim.separation import Separation, Watching, side_by_side
 from sim.sorties import gone_at_the_end
@@ -218,14 +218,13 @@ def told(flown: JointOutcome) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """The command line; exits 0 when every flight was good, else 1."""
-    parser = argparse.ArgumentParser(
-        prog="roisearch-sim flights --aircraft", description=(__doc__ or "").split("\n")[0]
-    )
+    parser = Parser(prog="roisearch-sim flights --aircraft", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("areas", nargs="+", type=Path, metavar="AREA", help="area files")
     parser.add_argument("--aircraft", type=int, required=True, metavar="N", help="how many fly each search")
     parser.add_argument("--trouble", action="store_true", help="cut the link of one in the middle, for good")
     add_options(parser, "area", speedup=10.0, patience_s=900.0)
     options = parser.parse_args(arguments)
+    check_areas(parser, options.areas)
     console, results = Console(), list[JointOutcome]()
     rest = Rest(console, options.seeds * len(options.areas), beside_bars=False)
     with tempfile.TemporaryDirectory() as scratch:

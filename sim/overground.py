@@ -9,7 +9,6 @@ With `--out` the same command goes on: a flight whose result is there is not flo
 
 from __future__ import annotations
 
-import argparse
 import json
 import tempfile
 import time
@@ -25,6 +24,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from service.errors import Parser
 from sim.autopilot.control import Control
 from sim.autopilot.process import AutopilotProcess
 from sim.flight_campaign import GOES_ON, add_flavors, add_options, kept, seeds_of
@@ -156,7 +156,7 @@ def table(results: list[OverGround]) -> Table:
 
 def main(arguments: list[str]) -> int:
     """The command line; exits 0 when every flight was good, else 1."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="roisearch-sim flights --ground",
         description=__doc__.split("\n")[0],
         epilog=GOES_ON,

@@ -22,6 +22,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from service.errors import Parser
 from service.resume import retrace, stored_run
 from service.rows import ResumedRow, SortieRow
 from service.search import Search as KnownGround
@@ -78,7 +79,7 @@ def _same(one: Search, other: Search) -> bool:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-sim flights --battery-min",
         description=__doc__.split("\n")[0],
         epilog=GOES_ON,

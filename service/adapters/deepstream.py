@@ -74,9 +74,9 @@ def json_values(lines: Iterable[str]) -> Iterator[Any]:
     """Each JSON value of a text in which they follow each other, on one line or on several.
 
     Raises:
-        BadInput: a value does not end within a megabyte.
+        BadInput: a value does not end within a megabyte, or none ever does.
     """
-    text, decoder = "", json.JSONDecoder()
+    text, decoder, any_ = "", json.JSONDecoder(), False
     for line in lines:
         text = (text + line.replace("\0", "")).lstrip()
         while text:
@@ -86,8 +86,11 @@ def json_values(lines: Iterable[str]) -> Iterator[Any]:
                 if len(text) > _MOST_TEXT:
                     raise BadInput("the input is no JSON of DeepStream: a message does not end") from None
                 break
+            any_ = True
             yield value
             text = text[end:].lstrip()
+    if text and not any_:
+        raise BadInput(f"the input is no JSON of DeepStream: {text[:60].rstrip()!r}; pipe its messages in")
 
 
 def _value(payload: bytes) -> Any:

@@ -7,12 +7,12 @@ import os
 from pathlib import Path
 
 from service.adapters.door import Door
-from service.errors import BadInput
+from service.errors import BadInput, Parser
 
 
 def parser(kind: str, words: str | None) -> argparse.ArgumentParser:
     """A parser with the flags of the door; `words` describe the kind."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog=f"roisearch-service detector {kind}",
         description=words,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -21,6 +21,7 @@ from service.area.route import KeepOut
 from service.errors import BadInput
 from service.geometry import LatLon
 from service.ground.relief import Relief
+from service.places import Coordinates, written
 
 if TYPE_CHECKING:
     from roisearch import Walk
@@ -60,6 +61,8 @@ class Grid:
         relief: the heights of the ground; None: it is taken as flat.
         target: how the target moves; None: it stands still.
         visibility: float [rows, cols], what a look from above finds there as a share of that in the open; None: all.
+        mobility: float [rows, cols], how well each cell is walked, 0 (not at all) to 1; None: all alike.
+        coordinates: how the team writes places, in notes and messages.
     """
 
     frame: GridFrame
@@ -77,6 +80,8 @@ class Grid:
     relief: Relief | None = None
     visibility: FloatArray | None = None
     target: Target | None = None
+    mobility: FloatArray | None = None
+    coordinates: Coordinates = "degrees"
 
     @property
     def walk(self) -> "Walk | None":
@@ -86,7 +91,9 @@ class Grid:
         """
         from roisearch import Walk
 
-        return None if self.target is None else Walk(cell_m=self.frame.cell_m, **asdict(self.target))
+        if self.target is None:
+            return None
+        return Walk(cell_m=self.frame.cell_m, mobility=self.mobility, **asdict(self.target))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -148,6 +155,21 @@ class Grid:
             )
         return replace(self, visibility=_frozen(visibility), layout_notes=notes)
 
+    def walked_at(self, area: SearchArea, mobility: FloatArray) -> "Grid":
+        """The same grid where the ground is walked so well, [rows, cols], 0 to 1: the rings of the area's lost persons
+        keep to it, and so does a target that walks.
+
+        Raises:
+            BadInput: a prior has no mass where it can be walked.
+        """
+        squares = cell_squares(self.frame)
+        prior = area_prior(area, self.frame, squares, self.covered, self.searchable, mobility)
+        return replace(self, prior=_frozen(prior), mobility=_frozen(mobility))
+
+    def noting(self, note: str) -> "Grid":
+        """The same grid with one more sentence for the operator."""
+        return replace(self, layout_notes=(*self.layout_notes, note))
+
     def excluding(self, shape: shapely.Geometry) -> "Grid":
         """The same grid with one more exclusion (degrees, x = longitude), which keeps its mass but is not flown over.
 
@@ -160,7 +182,9 @@ class Grid:
         allowed = self.flyable & ~shapely.intersects(blocked.zone.prepared, cell_squares(self.frame))
         if not allowed.any():
             raise where.bad("it leaves no cell to fly over; make it smaller")
-        flyable, _, notes = _reachable_part(self.frame, allowed, self.prior, blocked, self.launch, where)
+        flyable, _, notes = _reachable_part(
+            self.frame, allowed, self.prior, blocked, self.launch, where, self.coordinates
+        )
         start = nearest_flyable(self.frame, flyable, self.launch)
         return replace(
             self,
@@ -192,6 +216,7 @@ def build_grid(
     clearance_m: float = CLEARANCE_M,
     launch: LatLon | None = None,
     max_cells: int = 1_000_000,
+    coordinates: Coordinates = "degrees",
 ) -> Grid:
     """Lay cells over an area.
 
@@ -213,6 +238,7 @@ def build_grid(
         launch: (latitude, longitude) to use instead of the launch point of the file, such as
             the aircraft's home; it may be as far from the area as one in the file.
         max_cells: the largest grid, rows x cols.
+        coordinates: how the team writes places, in notes and messages.
 
     Raises:
         BadInput: cells too small or too large for the area, nothing left to fly over, or the
@@ -255,7 +281,7 @@ def build_grid(
     if not allowed.any():
         raise where.bad(f"the exclusions leave no cell of {cell_m:g} m to fly over; make them smaller")
     chosen = launch or area.launch
-    flyable, home, notes = _reachable_part(frame, allowed, prior, blocked, chosen, where)
+    flyable, home, notes = _reachable_part(frame, allowed, prior, blocked, chosen, where, coordinates)
     return Grid(
         frame=frame,
         prior=_frozen(prior),
@@ -270,6 +296,7 @@ def build_grid(
         layout_notes=crossed + notes,
         clearance_m=clearance_m,
         target=area.target,
+        coordinates=coordinates,
     )
 
 
@@ -297,7 +324,13 @@ def way_home(grid: Grid, start: LatLon, end: LatLon) -> list[LatLon]:
     Raises:
         BadInput: an exclusion closes every way.
     """
-    return route.way(grid.frame, grid.keep_out, start, end)
+    points = route.way(grid.frame, grid.keep_out, start, end)
+    if points is None:
+        raise BadInput(
+            f"no way from {written(start, grid.coordinates)} to {written(end, grid.coordinates)} "
+            "goes around the exclusions; leave a gap between them."
+        )
+    return points
 
 
 def transit_ground(frame: GridFrame, area: SearchArea) -> shapely.Geometry:
@@ -329,6 +362,7 @@ def _reachable_part(
     blocked: KeepOut,
     launch: LatLon | None,
     where: Where,
+    coordinates: Coordinates,
 ) -> tuple[BoolArray, LatLon, tuple[str, ...]]:
     """One connected part (4 neighbours) of the allowed cells, the launch point, and what to tell about it."""
     labels, count = ndimage.label(allowed)
@@ -341,7 +375,8 @@ def _reachable_part(
         cell = np.argwhere(part)[-1]
         lat, lon = frame.to_latlon([cell])[0]
         launch = (float(lat), float(lon))
-        notes += (f"The area file has no launch point; the search starts from {lat:.6f}, {lon:.6f}.",)
+        start = written(launch, coordinates)
+        notes += (f"The area file has no launch point; the search starts from {start}.",)
     else:
         home = frame.to_metres([launch])[0]
         if shapely.intersects_xy(blocked.zone.prepared, *home):

@@ -22,6 +22,8 @@ Rings = tuple[float, float, float, float]
 TERRAINS = ("temperate mountainous", "temperate flat", "dry mountainous", "dry flat", "urban")
 CHECKED_TWICE = frozenset({"dementia", "hiker"})
 _METRES_PER_MILE = 1609.344
+_BEGINS = 5
+"""So many letters of a word say what is meant: 'mountains' is mountainous."""
 
 _DRY = ("dry mountainous", "dry flat")
 _TEMPERATE = ("temperate mountainous", "temperate flat")
@@ -169,6 +171,11 @@ def _known(text: str, names: tuple[str, ...], what: str) -> str:
     by_spelling = {_spelt(name): name for name in names}
     if found := by_spelling.get(_spelt(text)):
         return found
+    begun = [each[:_BEGINS] for each in _spelt(text).split()]
+    kinds = [name for spelt, name in by_spelling.items() if begun and all(each in spelt for each in begun)]
     near = difflib.get_close_matches(_spelt(text), by_spelling, n=1)
-    hint = f"did you mean '{by_spelling[near[0]]}'?" if near else f"there is {', '.join(names)}"
+    if len(kinds) > 1:
+        hint = f"take {', '.join(kinds)}"
+    else:
+        hint = f"did you mean '{by_spelling[near[0]]}'?" if near else f"there is {', '.join(kinds or names)}"
     raise ValueError(f"there is no {what} '{text[:40]}'; {hint}")

@@ -33,7 +33,12 @@ def covered_fraction(squares: shapely.Geometry, ground: shapely.Geometry) -> Flo
 
 
 def area_prior(
-    area: SearchArea, frame: GridFrame, squares: shapely.Geometry, fraction: FloatArray, searchable: BoolArray
+    area: SearchArea,
+    frame: GridFrame,
+    squares: shapely.Geometry,
+    fraction: FloatArray,
+    searchable: BoolArray,
+    mobility: FloatArray | None = None,
 ) -> FloatArray:
     """The prior of an area file on a grid.
 
@@ -49,6 +54,7 @@ def area_prior(
         squares: its cells, [rows, cols] (see `cell_squares`).
         fraction: how much of each cell is ground, float [rows, cols].
         searchable: the cells that count, bool [rows, cols].
+        mobility: how well each is walked, float [rows, cols], 0 to 1, to which rings keep; None: all alike.
 
     Returns:
         float [rows, cols], zero where not searchable, summing to 1.
@@ -60,13 +66,18 @@ def area_prior(
     if not area.priors:
         return np.asarray(ground / ground.sum())
     mass: FloatArray = np.zeros(frame.shape)
-    for part in prior_parts(area, frame, squares, fraction, searchable):
+    for part in prior_parts(area, frame, squares, fraction, searchable, mobility):
         mass += part
     return np.asarray(mass / mass.sum())
 
 
 def prior_parts(
-    area: SearchArea, frame: GridFrame, squares: shapely.Geometry, fraction: FloatArray, searchable: BoolArray
+    area: SearchArea,
+    frame: GridFrame,
+    squares: shapely.Geometry,
+    fraction: FloatArray,
+    searchable: BoolArray,
+    mobility: FloatArray | None = None,
 ) -> Iterator[FloatArray]:
     """What each prior feature of an area adds, float [rows, cols] in the file's order; arguments as `area_prior`.
 
@@ -76,18 +87,25 @@ def prior_parts(
     flat_ground = frame.flatten(area.ground)
     largest = max((prior.weight for prior in area.priors), default=1.0)
     for prior in area.priors:
-        share = np.where(searchable, _share(prior, frame, squares, flat_ground), 0.0)
+        share = np.where(searchable, _share(prior, frame, squares, flat_ground, mobility), 0.0)
         if isinstance(prior, PointPrior):
             share = share * ground
         total = share.sum()
         if not total > 0:
             where = Where(area.source, prior.label)
-            raise where.bad("the prior has no mass on any cell that is searched; move it or widen it")
+            walked = "" if mobility is None or not isinstance(prior, RingPrior) else " and can be walked"
+            raise where.bad(
+                f"the prior has no mass on any cell that is searched{walked}; move it or widen it"
+            )
         yield prior.weight / largest * (share / total)
 
 
 def _share(
-    prior: Prior, frame: GridFrame, squares: shapely.Geometry, flat_ground: shapely.Geometry
+    prior: Prior,
+    frame: GridFrame,
+    squares: shapely.Geometry,
+    flat_ground: shapely.Geometry,
+    mobility: FloatArray | None,
 ) -> FloatArray:
     """One prior on the cells, [rows, cols], of any sum."""
     if isinstance(prior, PointPrior):
@@ -96,22 +114,28 @@ def _share(
         inside = shapely.buffer(frame.flatten(prior.line), prior.width_m / 2)
     elif isinstance(prior, RingPrior):
         east, south = frame.to_metres([prior.position])[0]
-        return ring_mass(prior, (float(east), float(south)), squares, flat_ground)
+        return ring_mass(prior, (float(east), float(south)), squares, flat_ground, mobility)
     else:
         inside = frame.flatten(prior.polygon)
     return covered_fraction(squares, shapely.intersection(inside, flat_ground))
 
 
 def ring_mass(
-    prior: RingPrior, centre: tuple[float, float], squares: shapely.Geometry, ground: shapely.Geometry
+    prior: RingPrior,
+    centre: tuple[float, float],
+    squares: shapely.Geometry,
+    ground: shapely.Geometry,
+    mobility: FloatArray | None = None,
 ) -> FloatArray:
     """The probability that a ring prior gives to the ground in each square, [rows, cols]: exact, since within a ring
-    it is even by surface. It sums to what lies in the ground.
+    it is even by surface times mobility. It sums to what lies in the ground: mobility moves nothing from ring to ring,
+    so that the published distances stay, but for a ring in which nothing is walked, whose part is lost.
 
     Args:
         prior: the rings.
         centre: where they are centred, in the metres of `squares` and `ground`.
         squares, ground: flat geometries; the squares are [rows, cols].
+        mobility: how well each square is walked, float [rows, cols], 0 to 1; None: all alike.
     """
     point = shapely.Point(centre)
     surface = shapely.area(squares)
@@ -121,9 +145,18 @@ def ring_mass(
     for radius, share in zip(ring_edges(prior), RING_MASS, strict=True):
         disc = shapely.buffer(point, radius, quad_segs=64)
         within = covered_fraction(squares, shapely.intersection(disc, ground)) * surface
-        mass += share * (within - inner) / (disc.area - inner_area)
+        mass += share * _by_mobility(within - inner, mobility) / (disc.area - inner_area)
         inner, inner_area = within, disc.area
     return np.maximum(mass, 0.0)
+
+
+def _by_mobility(ring: FloatArray, mobility: FloatArray | None) -> FloatArray:
+    """The ground of a ring in each square, m² [rows, cols], weighed by how well it is walked and of the same sum."""
+    if mobility is None:
+        return ring
+    weighed = np.maximum(ring, 0.0) * mobility
+    whole = weighed.sum()
+    return np.asarray(weighed * (ring.sum() / whole)) if whole > 0.0 else weighed
 
 
 def rings_inside(prior: RingPrior, centre: ArrayLike, ground: shapely.Geometry) -> float:

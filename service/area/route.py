@@ -152,23 +152,18 @@ def leads_out(frame: GridFrame, blocked: KeepOut, start: LatLon, end: LatLon) ->
     return bool(begins and not ends and inside.geom_type == "LineString" and about)
 
 
-def way(frame: GridFrame, blocked: KeepOut, start: LatLon, end: LatLon) -> list[LatLon]:
+def way(frame: GridFrame, blocked: KeepOut, start: LatLon, end: LatLon) -> list[LatLon] | None:
     """The shortest route between two positions that no exclusion is in the way of.
 
     Returns:
         the positions to fly to in order, the last being `end`; just [`end`] when the straight
         leg is clear. When `start` lies inside an exclusion or its clearance (wind, drift), the
-        first position is the nearest one outside; the same, backwards, for `end`.
-
-    Raises:
-        BadInput: an exclusion closes every way.
+        first position is the nearest one outside; the same, backwards, for `end`. None: an
+        exclusion closes every way.
     """
     points = frame.to_metres([start, end])
     route = shortest_route(blocked, points[0], points[1])
     if route is None:
-        raise BadInput(
-            f"no way from {start[0]:.6f}, {start[1]:.6f} to {end[0]:.6f}, {end[1]:.6f} "
-            "goes around the exclusions; leave a gap between them."
-        )
+        return None
     bends = [(float(lat), float(lon)) for lat, lon in frame.from_metres(np.array(route[:-1]))]
     return [*bends, end]

@@ -6,11 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.errors import BadInput
+from service.errors import BadInput, Parser
 
 if TYPE_CHECKING:
     from service.area import SearchArea
     from service.area.document import Document
+    from service.places import Coordinates
 
 EXAMPLES = """\
 examples:
@@ -22,7 +23,7 @@ kinds: GeoJSON (ours, geojson.io, QGIS), CalTopo and SARTopo exports, KML, KMZ, 
 
 def main(arguments: list[str]) -> int:
     """Print what a file says, and write it as our GeoJSON if asked to; returns 0, or raises BadInput."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="roisearch-service area",
         description="What is understood of an area file: roles, priors and their weights, what was left out and why.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -31,13 +32,17 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("what", choices=("check",))
     parser.add_argument("file", metavar="FILE", type=Path)
     parser.add_argument("--out", metavar="FILE", type=Path, help="write it as GeoJSON with all roles")
-    parser.add_argument("--config", metavar="FILE", type=Path, help="settings, for search.max_area_km2")
+    parser.add_argument(
+        "--config", metavar="FILE", type=Path, help="settings, for search.max_area_km2 and run.coordinates"
+    )
     options = parser.parse_args(arguments)
     from service.config import read_settings
     from service.survey import read_survey
 
-    area, document = read_survey(options.file, read_settings(options.config))
-    print("\n".join(f"{name:10} {sentence}".rstrip() for name, sentence in understood(area, document)))
+    settings = read_settings(options.config)
+    area, document = read_survey(options.file, settings)
+    said = understood(area, document, settings.run.coordinates)
+    print("\n".join(f"{name:10} {sentence}".rstrip() for name, sentence in said))
     if options.out is not None:
         from service.area.document import as_geojson
 
@@ -51,10 +56,11 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def understood(area: SearchArea, document: Document) -> list[tuple[str, str]]:
+def understood(area: SearchArea, document: Document, coordinates: Coordinates) -> list[tuple[str, str]]:
     """Pairs of a word and a sentence: format, area, priors with their share, exclusions, launch point, notes."""
     from service.area.describing import described_priors
     from service.area.projection import surface_m2
+    from service.places import written
 
     parts = len(area.polygon.geoms)
     pieces = "" if parts == 1 else f" in {parts} parts"
@@ -69,9 +75,9 @@ def understood(area: SearchArea, document: Document) -> list[tuple[str, str]]:
     for each in area.exclusions:
         kind = "the target may be there" if each.searchable else "not searched"
         said.append(("exclude", f"{surface_m2(each.polygon) / 1e4:.1f} ha, {kind}: {each.label}"))
-    launch = (
-        "none: the search starts at an edge" if area.launch is None else "{:.6f}, {:.6f}".format(*area.launch)
+    launch = area.launch
+    said.append(
+        ("launch", "none: the search starts at an edge" if launch is None else written(launch, coordinates))
     )
-    said.append(("launch", launch))
     said += [("note", note) for note in area.notes]
     return said

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.errors import BadInput
+from service.errors import BadInput, Parser
 
 if TYPE_CHECKING:
     from service.evidence.measured import Measured, Rate
@@ -19,12 +19,16 @@ if TYPE_CHECKING:
 
 def main(arguments: list[str]) -> int:
     """Measure, and write what was asked for."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="roisearch-service calibrate", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("file", metavar="FILE", type=Path)
     parser.add_argument(
-        "--threshold", type=float, default=0.0, metavar="SCORE", help="the score from which on it reports (0)"
+        "--threshold",
+        type=_score,
+        default=0.0,
+        metavar="SCORE",
+        help="the score from which on it reports (0)",
     )
     parser.add_argument("--table", type=Path, metavar="CSV", help="write a table for sensor.calibration_file")
     parser.add_argument("--picture", type=Path, metavar="PNG", help="draw the rates and how sure they are")
@@ -50,8 +54,16 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
+def _score(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"'{text}' is no score between 0 and 1")
+    return value
+
+
 def _told(rate: Rate) -> str:
-    return f"{rate.value:.3f} (95 %: {rate.low:.3f} to {rate.high:.3f}, from {rate.cases} passes)"
+    passes = "1 pass" if rate.cases == 1 else f"{rate.cases} passes"
+    return f"{rate.value:.3f} (95 %: {rate.low:.3f} to {rate.high:.3f}, from {passes})"
 
 
 def _draw(rows: Sequence[Measured], path: Path) -> None:

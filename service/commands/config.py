@@ -19,6 +19,7 @@ from service.config import (
     read_toml,
     variable_name,
 )
+from service.errors import Parser
 from service.toml_lines import key_lines
 
 SECRETS = frozenset({"ROISEARCH_HTTP_TOKEN", "ROISEARCH_HTTP_REPORT_TOKEN", "ROISEARCH_TOKEN"})
@@ -27,7 +28,7 @@ SECRETS = frozenset({"ROISEARCH_HTTP_TOKEN", "ROISEARCH_HTTP_REPORT_TOKEN", "ROI
 
 def parser() -> argparse.ArgumentParser:
     """The words and flags."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-service config",
         description="Check a settings file, or show what a run would be set to and where each value is from.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -51,6 +52,10 @@ def main(arguments: list[str]) -> int:
             print(sentence, file=sys.stderr)
         return 2
     settings = read_settings(options.file)
+    if options.word == "check":
+        from service.telling.settings import read_plan
+
+        read_plan(settings.telling)
     origin = sources(options.file, os.environ)
     changed = [key for key in KNOWN_KEYS if key in origin]
     if options.word == "check":

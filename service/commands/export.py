@@ -7,7 +7,7 @@ import logging
 import sys
 from pathlib import Path
 
-from service.errors import BadInput
+from service.errors import BadInput, Parser
 
 EXAMPLES = """\
 examples:
@@ -23,7 +23,7 @@ def parser() -> argparse.ArgumentParser:
     from service.export.formats import FORMATS
 
     formats = "\n".join(f"  {name:8} {format_.about}" for name, format_ in FORMATS.items())
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-service export",
         description="A run as a file, whether it is under way (it is not disturbed) or over.",
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -6,10 +6,12 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from service.errors import Parser
+
 
 def parser() -> argparse.ArgumentParser:
     """The flags."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-service pack",
         description="Put a run, under way or over, into one file: journal, area, prior and settings without secrets.",
         formatter_class=argparse.RawDescriptionHelpFormatter,

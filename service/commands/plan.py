@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from service.errors import BadInput, Parser
+
 if TYPE_CHECKING:
     from service.config import Settings
     from service.http import Door
@@ -26,7 +28,7 @@ What stands in --out already is drawn on. Ctrl-C ends it; what was saved stays.
 
 def parser() -> argparse.ArgumentParser:
     """The flags."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-service plan",
         description="Draw search area, likely places, ground not to fly over and launch on the page, and save them.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -62,6 +64,7 @@ def main(arguments: Sequence[str]) -> int:
         "link.speedup": options.speedup,
     }
     settings = read_settings(options.config, flags=flags)
+    _check_file(options.out, settings)
     with contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door:
         port = door.listener.getsockname()[1]
         address = bound_address(door.listener)
@@ -74,6 +77,16 @@ def main(arguments: Sequence[str]) -> int:
     host = f"[{address}]" if address.version == 6 else str(address)
     flags["http.listen"] = f"{host}:{port}"  # the page that is open goes on at the same address
     return run(options.out, None, read_settings(options.config, flags=flags))
+
+
+def _check_file(file: Path, settings: Settings) -> None:
+    """Raises BadInput, before anybody draws, when nothing can be saved there or what is there is no area."""
+    from service.http.plan import Plan
+
+    folder = file.absolute().parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise BadInput(f"{file}: cannot be written there; give --out in a folder that is there and yours")
+    Plan(file, settings).so_far()
 
 
 async def _draw(file: Path, settings: Settings, door: Door) -> bool:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from service.errors import BadInput
+from service.errors import BadInput, Parser
 
 if TYPE_CHECKING:
     from service.preview.preview import Preview
@@ -23,7 +23,7 @@ examples:
 
 def parser() -> argparse.ArgumentParser:
     """The flags."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-service preview",
         description="What a search will be like: grid, ROIs, first minutes, time to 50, 75 and 95 % POS, battery.",
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -10,10 +10,12 @@ import signal
 from collections.abc import Sequence
 from pathlib import Path
 
+from service.errors import Parser
+
 
 def parser() -> argparse.ArgumentParser:
     """The flags."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-service replay",
         description="Show a run that is over or was interrupted on the page, with a time slider. Nothing is changed.",
         formatter_class=argparse.RawDescriptionHelpFormatter,

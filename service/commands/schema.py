@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
+from service.errors import Parser
 
 
 def main(arguments: list[str]) -> int:
     """Print it."""
-    parser = argparse.ArgumentParser(prog="roisearch-service schema", description=__doc__)
+    parser = Parser(prog="roisearch-service schema", description=__doc__)
     parser.add_argument("of", nargs="?", choices=("report", "receipt", "news"), default="report")
     of = parser.parse_args(arguments).of
     from service.evidence.reports import receipt_schema, report_schema, schema_text

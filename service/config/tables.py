@@ -120,6 +120,7 @@ class GroundSettings(Section):
     file: Names = []
     flat: bool = False
     cover_file: str = ""
+    mobility_file: str = ""
     position_error_m: float = Field(default=5.0, ge=0, le=100)
     max_datum_difference_m: float = Field(default=60.0, gt=0, le=1000)
 

@@ -94,6 +94,8 @@ def read_scored(path: Path) -> list[Scored]:
 
     Raises BadInput with the line that is wrong, or when there is no case of either kind.
     """
+    if not path.is_file():
+        raise BadInput(f"{path}: there is no such file; give a CSV file of scored frames")
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise BadInput(f"{path}: is larger than {_MOST_BYTES >> 20} MB; give the best score of each pass")

@@ -15,6 +15,7 @@ from fastapi.responses import FileResponse, JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.area.document import as_geojson
+from service.area.lost_persons import SUBJECTS, terrains_of
 from service.area.projection import surface_m2
 from service.config import Settings
 from service.errors import BadInput
@@ -112,8 +113,13 @@ def create_plan_app(
     async def read() -> dict[str, Any]:
         drawn = await asyncio.to_thread(plan.so_far)
         coordinates = plan.settings.run.coordinates
-        tiles = underlay.describe()
-        return {"file": str(plan.file), "drawn": drawn, "tiles": tiles, "coordinates": coordinates}
+        return {
+            "file": str(plan.file),
+            "drawn": drawn,
+            "tiles": underlay.describe(),
+            "coordinates": coordinates,
+            "subjects": {name: terrains_of(name) for name in SUBJECTS},
+        }
 
     @app.get("/api/written")
     async def as_the_team_writes(

@@ -11,6 +11,7 @@ _CHUNK = 50
 _LONGEST = 4 * _CHUNK
 _PATIENCE_S = 2.0
 _MOST_OPEN = 8
+_ASCII = str.maketrans({"°": "", "′": "'"})
 
 
 class TextReader:
@@ -54,11 +55,11 @@ def text_messages(text: str, severity: int, text_id: int) -> list[Message]:
     """STATUSTEXT messages for our own text: ASCII, one message up to 50 characters, else chunks of whole words.
 
     Args:
-        text: what to say; other characters become question marks.
+        text: what to say; degrees and minutes of arc become `47 03.115'`, other characters question marks.
         severity: MAV_SEVERITY, 0 (emergency) to 7 (debug).
         text_id: 1 to 65535, different from the last one; used only for a chunked text.
     """
-    plain = " ".join(text.split()).encode("ascii", "replace")[:_LONGEST]
+    plain = " ".join(text.translate(_ASCII).split()).encode("ascii", "replace")[:_LONGEST]
     if len(plain) <= _CHUNK:
         return [mavlink.MAVLink_statustext_message(severity, plain, 0, 0)]
     chunks = _pieces(plain)

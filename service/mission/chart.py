@@ -16,6 +16,7 @@ from service.errors import BadInput
 from service.geometry import Cell, LatLon, Metres
 from service.mavlink.telemetry import Telemetry
 from service.mission.fence import Fence
+from service.places import written
 
 log = logging.getLogger("roisearch")
 GOES_MPS = 1.0
@@ -54,6 +55,10 @@ class Chart:
         """The cell under the aircraft (the nearest one when it is off the grid), and whether it is on it."""
         cells, inside = self.frame.locate(np.array([here(t)]))
         return (int(cells[0, 0]), int(cells[0, 1])), bool(inside[0])
+
+    def written(self, point: LatLon) -> str:
+        """A position as the team writes places."""
+        return written(point, self.grid.coordinates)
 
     def heading(self, t: Telemetry) -> str:
         """Where it goes, in the grid's eight directions; where its nose points while it goes nowhere."""

@@ -60,6 +60,7 @@ from service.mission.news import (
     News,
     NotSent,
     NotStopped,
+    NotThought,
     Order,
     Thought,
 )
@@ -170,7 +171,7 @@ class MissionCore:
                 self.flight.hits.extend(places)
             case MapChanged(grid=grid) if grid is not self.chart.grid:
                 self._fly_around(grid)
-            case MapChanged():
+            case MapChanged() | NotThought():
                 pass
             case NotSent(action=waypoint, objection=objection):
                 self.doing = None
@@ -183,7 +184,7 @@ class MissionCore:
             case _:
                 self._want(self._watch.read(news, self._look()))
         self._want(self._watch.landed(self._look()))
-        its_own = isinstance(news, (Thought, Hit, MapChanged)) or (
+        its_own = isinstance(news, (Thought, NotThought, Hit, MapChanged)) or (
             isinstance(news, (Done, Failed)) and not ordered_it
         )
         if its_own and self._phase is phase:

@@ -40,7 +40,7 @@ def found_after_all(look: Look) -> Iterator[Wish]:
     yield Find(found)
     if found is None:
         return
-    at = _at(found)
+    at = _at(found, look)
     moved_m = math.inf if known is None else distance_m((known.lat, known.lon), (found.lat, found.lon))
     if moved_m > 0.0:
         yield WriteRow(FoundRow(found))
@@ -56,12 +56,13 @@ def tell(found: Found, look: Look, why: str) -> Iterator[Wish]:
     """Write down what was found; it ends the search unless that is to continue and nobody confirmed it."""
     yield WriteRow(FoundRow(found))
     if look.seen.confirmed or look.settings.search.on_found != "continue":
-        told = f"{found.lat:.6f}, {found.lon:.6f} p={found.probability:.4f}"  # the 50 characters of one STATUSTEXT
-        yield Happen(Event.CONFIRMED, f"{_at(found)}: {why}", told=told)
+        place = look.chart.written((found.lat, found.lon))
+        told = f"{place} p={found.probability:.4f}"  # the 50 characters of one STATUSTEXT
+        yield Happen(Event.CONFIRMED, f"{_at(found, look)}: {why}", told=told)
 
 
-def _at(found: Found) -> str:
-    return f"found at {found.lat:.6f}, {found.lon:.6f}, p = {found.probability:.4f}"
+def _at(found: Found, look: Look) -> str:
+    return f"found at {look.chart.written((found.lat, found.lon))}, p = {found.probability:.4f}"
 
 
 def over_for_all(look: Look) -> Iterator[Wish]:

@@ -171,7 +171,7 @@ class Helm:
         point, on_way = waypoint.point, waypoint.on_way
         if doubts := self.doubts(t, now):
             return Objection("position", "; ".join(doubts))
-        chart, where = self._chart, f"the waypoint {point[0]:.6f}, {point[1]:.6f}"
+        chart, where = self._chart, f"the waypoint {self._chart.written(point)}"
         if not chart.leg_allowed(here(t), point):
             return Objection("limits", f"{where} lies behind an excluded area")
         leg = chart.metres(here(t)), chart.metres(point)

@@ -57,7 +57,7 @@ class Homeward(Phase):
                     points = points[:-1]  # from there the autopilot flies
                 self._way = Way(points, climb=bool(points))
         if self._way is not None and (place := self._aside.place(look)) is not None:
-            yield Note(f"makes room for the others at {place[0]:.6f}, {place[1]:.6f}")
+            yield Note(f"makes room for the others at {look.chart.written(place)}")
             self._way = Way([place, *look.chart.route(place, look.chart.home(t))], climb=False)
         if self._way is not None:
             yield from self._way.tick(look)

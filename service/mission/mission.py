@@ -62,6 +62,7 @@ from service.mission.news import (
     News,
     NotSent,
     NotStopped,
+    NotThought,
     Order,
     Thought,
 )
@@ -369,7 +370,15 @@ class Mission:
     async def _think(self, wanted: Think) -> None:
         unseen = [cell for cell in wanted.ahead if cell not in self.intake.passes]
         state = SearchState(wanted.cell, wanted.heading, wanted.speed_mps)
-        decision = await self.search.decide(state, unseen, wanted.left, self.clock.now())
+        try:
+            decision = await self.search.decide(state, unseen, wanted.left, self.clock.now())
+        except (
+            Exception
+        ) as error:  # whatever a planner from outside does: the aircraft is not left alone for it
+            log.exception("the planner has failed")
+            self._thinking = None
+            self._feed(NotThought(f"{type(error).__name__}: {error}"))
+            return
         self._thinking = None
         self._stopwatch.decision(decision.effort.seconds)
         reason, worth = self.search.reason(decision, wanted.cell), self.search.worth_a_look(decision.path)

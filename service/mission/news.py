@@ -62,6 +62,13 @@ class Thought:
 
 
 @dataclass(frozen=True, slots=True)
+class NotThought:
+    """No decision is made: the planner has failed, for this reason."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Done:
     """An action has been carried out; `latency_s` is that of a waypoint that a hit asked for."""
 
@@ -92,4 +99,16 @@ class NotStopped:
     reason: str
 
 
-News = VehicleEvent | Order | Judged | Hit | MapChanged | Thought | Done | Failed | NotSent | NotStopped
+News = (
+    VehicleEvent
+    | Order
+    | Judged
+    | Hit
+    | MapChanged
+    | Thought
+    | NotThought
+    | Done
+    | Failed
+    | NotSent
+    | NotStopped
+)

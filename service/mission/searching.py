@@ -21,7 +21,7 @@ from service.mission.heights import CLIMBED_M
 from service.mission.heights import Leg as Height
 from service.mission.lessons import Lessons
 from service.mission.navigator import Navigator, straight_cells
-from service.mission.news import Done, Failed, Hit, MapChanged, News, NotSent, Thought
+from service.mission.news import Done, Failed, Hit, MapChanged, News, NotSent, NotThought, Thought
 from service.mission.phase import RETRY_S, Begin, Enter, Happen, Hold, Listen, Phase, Way, Wish
 from service.mission.situation import Situation
 from service.mission.standing import Look
@@ -112,6 +112,9 @@ class Searching(Phase):
                 self._thinking = False
                 self._navigator.decide(decision.path, worth)
                 yield from self._steer(look)
+            case NotThought(reason=reason) if self._thinking:
+                self._thinking = False
+                yield Hold("planner", f"the planner fails ({reason})")
             case Hit(arrived=arrived) if self._looking:
                 yield from self._interrupt(look)
                 self._hit_at = arrived
@@ -137,7 +140,7 @@ class Searching(Phase):
         """Out of another's way, and decide anew from there."""
         self._looking, self._hovering, self._levelling = False, False, None
         self._way = Way([place], climb=False)
-        yield Note(f"makes room for the others at {place[0]:.6f}, {place[1]:.6f}")
+        yield Note(f"makes room for the others at {look.chart.written(place)}")
         yield from self._forget()
         yield from self._way.tick(look)
 

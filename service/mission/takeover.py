@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
+from service.geometry import LatLon
 from service.mavlink.events import (
     ArmedChanged,
     ModeChanged,
@@ -25,10 +27,10 @@ class Takeovers:
         self._texts: deque[StatusText] = deque(maxlen=6)
         self._taken_at: deque[float] = deque(maxlen=6)
 
-    def read(self, event: VehicleEvent, *, landing: bool) -> str:
+    def read(self, event: VehicleEvent, *, landing: bool, written: Callable[[LatLon], str]) -> str:
         """Why the aircraft is not ours any more after this event, for a person; nothing when it still is.
 
-        `landing`: it is on its way home, where it disarms by itself.
+        `landing`: it is on its way home, where it disarms by itself. `written`: a place as the team writes places.
         """
         if isinstance(event, StatusText) and event.severity <= _WARNING:
             self._texts.append(event)
@@ -37,7 +39,7 @@ class Takeovers:
             who = "the autopilot's failsafe" if event.failsafe else "the pilot or the autopilot"
             return f"{who} selected {mode_title(event.mode)}{self.said(event.time)}"
         if isinstance(event, TargetReplaced):
-            return f"{event.by} sends the aircraft to {event.found.lat:.6f}, {event.found.lon:.6f}"
+            return f"{event.by} sends the aircraft to {written((event.found.lat, event.found.lon))}"
         if isinstance(event, Rebooted):
             return "the autopilot has rebooted"
         if isinstance(event, ArmedChanged) and not event.armed and not landing:

@@ -53,7 +53,7 @@ class VehicleWatch:
 
     def read(self, event: VehicleEvent, look: Look) -> Iterator[Wish]:
         """What follows from an event."""
-        why = self._takeovers.read(event, landing=_lands(look.standing))
+        why = self._takeovers.read(event, landing=_lands(look.standing), written=look.chart.written)
         if isinstance(event, ModeChanged):
             yield WriteRow(ModeRow(event.mode, event.commanded))
         if why:

@@ -1,12 +1,20 @@
 // Drawing without a pointer: the map moves under a cross-hair in its middle, and a corner is set where that points.
 // What is drawn by keys or buttons and what is drawn by clicks is one drawing; both may take turns at it.
 
+import { inWords } from "./cursor.js";
 import { $, say } from "./dom.js";
 
 const STEP_PX = 20;
 const LEAP_PX = 100; // with Shift
 const SAME_PX = 12; // so near to the first corner it is meant
 const PAUSE_MS = 350; // after the last move, until the place is told
+
+/** What has corners: how many it needs, how it is called, and what ends it.
+ * @type {Record<string, { least: number, needs: string, end: string }>} */
+const CORNERED = {
+  Polygon: { least: 3, needs: "Ground needs three corners", end: "Close" },
+  Line: { least: 2, needs: "A line needs two corners", end: "End" },
+};
 
 /** @type {Record<string, [number, number]>} */
 export const ARROWS = {
@@ -36,6 +44,8 @@ const corners = (count) => (count === 1 ? "1 corner" : `${count} corners`);
 export class Crosshair {
   /** Whether something is being drawn. */
   drawing = false;
+  /** What is drawn, in the words of the drawing plugin. */
+  shape = "";
   /** The line so far; null for a thing of one point. @type {any} */
   line = null;
   /** What has the keyboard again afterwards. @type {any} */
@@ -49,7 +59,8 @@ export class Crosshair {
     this.map = map;
     this.onAim = onAim;
     map.on("pm:drawstart", (/** @type {any} */ { shape, workingLayer }) => {
-      this.line = shape === "Polygon" ? workingLayer : null;
+      this.shape = shape;
+      this.line = CORNERED[shape] ? workingLayer : null;
       this.show(true);
     });
     map.on("pm:drawend", () => this.show(false));
@@ -80,7 +91,8 @@ export class Crosshair {
     this.drawing = drawing;
     $("aim").hidden = $("crosshair").hidden = !drawing;
     $("close").hidden = $("take-back").hidden = !this.line;
-    clearTimeout(this.timer);
+    say($("close"), CORNERED[this.shape]?.end ?? "");
+    this.hush();
   }
 
   /** @param {KeyboardEvent} event */
@@ -131,20 +143,31 @@ export class Crosshair {
     const at = this.map.getCenter();
     this.onAim(at);
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => announce(this.placed(at)), PAUSE_MS);
+    const timer = setTimeout(() => this.tellPlace(at, timer), PAUSE_MS);
+    this.timer = timer;
   }
 
-  /** @param {any} at */
-  placed(at) {
-    if (this.onFirst(at)) return "On the first corner: set it again to close the ground.";
-    return `${at.lat.toFixed(6)}, ${at.lng.toFixed(6)}${this.fromLast(at)}`;
+  /** Say where the cross-hair is, unless something else has been said or done meanwhile.
+   * @param {any} at
+   * @param {ReturnType<typeof setTimeout>} timer */
+  async tellPlace(at, timer) {
+    const words = this.onFirst(at)
+      ? "On the first corner: set it again to close the ground."
+      : `${await inWords(at)}${this.fromLast(at)}`;
+    if (this.timer === timer) announce(words);
+  }
+
+  /** What was going to be said of a place is not said any more. */
+  hush() {
+    clearTimeout(this.timer);
+    this.timer = undefined;
   }
 
   /** Whether a place is the first corner, and the ground can be closed there.
    * @param {any} at */
   onFirst(at) {
     const set = this.corners();
-    if (set.length < 3) return false;
+    if (this.shape !== "Polygon" || set.length < CORNERED.Polygon.least) return false;
     const [one, other] = [at, set[0]].map((each) => this.map.latLngToContainerPoint(each));
     return one.distanceTo(other) <= SAME_PX;
   }
@@ -167,17 +190,16 @@ export class Crosshair {
   refused(at) {
     const same = this.corners().some((each) => each.equals(at));
     return same
-      ? "There is a corner here already; ground needs three."
+      ? `There is a corner here already. ${CORNERED[this.shape].needs}.`
       : "No corner is set: the border would cross itself.";
   }
 
-  /** Close the ground. */
+  /** Close the ground, or end the line. */
   close() {
-    const set = this.corners();
-    if (set.length < 3) {
-      return void announce(`Ground needs three corners, and there are ${set.length}.`);
-    }
-    this.click(set[0]);
+    const set = this.corners(),
+      { least, needs } = CORNERED[this.shape];
+    if (set.length < least) return void announce(`${needs}, and there are ${set.length}.`);
+    this.click(this.shape === "Polygon" ? set[0] : set.at(-1));
     if (this.drawing) announce("It cannot be closed: the border would cross itself.");
     else this.end();
   }
@@ -185,6 +207,7 @@ export class Crosshair {
   /** What a click there does: the drawing plugin asks no more of it.
    * @param {any} latlng */
   click(latlng) {
+    this.hush();
     this.map.fire("click", { latlng });
   }
 
@@ -192,13 +215,13 @@ export class Crosshair {
   takeBack() {
     const count = this.corners().length;
     if (!count) return void announce("There is no corner to take back.");
-    const { Polygon } = this.map.pm.Draw;
+    const drawer = this.map.pm.Draw[this.shape];
     if (count > 1) {
-      Polygon._removeLastVertex();
+      drawer._removeLastVertex();
     } // what the plugin's own toolbar calls
     else {
       this.map.pm.disableDraw();
-      this.map.pm.enableDraw("Polygon", Polygon.options);
+      this.map.pm.enableDraw(this.shape, drawer.options);
     }
     return void announce(`Taken back; ${corners(count - 1)} left.`);
   }

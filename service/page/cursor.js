@@ -1,41 +1,38 @@
-// The place under the cursor in the team's own coordinates.
+// Places in the team's own coordinates.
 
 import { $, placeOf, say } from "./dom.js";
 import { ask } from "./link.js";
 
 const PAUSE_MS = 120;
 
-/** The place under the cursor, or the one that was tapped. */
-export class Cursor {
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  timer;
+/** How the team writes places. */
+let coordinates = "degrees";
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let timer;
 
-  /** @param {string} coordinates how the team writes places */
-  constructor(coordinates) {
-    this.coordinates = coordinates;
-  }
+/** Write places as the team does from now on.
+ * @param {string} how */
+export function writeAs(how) {
+  coordinates = how;
+}
 
-  /** @param {{ lat: number, lng: number }} at */
-  show({ lat, lng }) {
-    const degrees = placeOf({ lat, lon: lng });
-    clearTimeout(this.timer);
-    if (this.coordinates === "degrees") return void say($("cursor"), degrees);
-    this.timer = setTimeout(
-      async () => say($("cursor"), await this.write(lat, lng, degrees)),
-      PAUSE_MS,
-    );
+/** A place as the team writes it: grids are worked out by the service, which has the libraries for them.
+ * @param {{ lat: number, lng: number }} at
+ * @returns {Promise<string>} */
+export async function inWords({ lat, lng }) {
+  const degrees = placeOf({ lat, lon: lng });
+  if (coordinates === "degrees") return degrees;
+  try {
+    return (await (await ask(`/api/written?lat=${lat}&lon=${lng}`)).json()).written;
+  } catch {
+    return degrees;
   }
+}
 
-  /** Grids are worked out by the service, which has the libraries for them.
-   * @param {number} lat
-   * @param {number} lon
-   * @param {string} otherwise
-   * @returns {Promise<string>} */
-  async write(lat, lon, otherwise) {
-    try {
-      return (await (await ask(`/api/written?lat=${lat}&lon=${lon}`)).json()).written;
-    } catch {
-      return otherwise;
-    }
-  }
+/** Show the place under the cursor, or the one that was tapped, once it stays.
+ * @param {{ lat: number, lng: number }} at */
+export function showPlace(at) {
+  clearTimeout(timer);
+  const wait = coordinates === "degrees" ? 0 : PAUSE_MS;
+  timer = setTimeout(async () => say($("cursor"), await inWords(at)), wait);
 }

@@ -1,6 +1,7 @@
 // What can be dragged on the map can be moved by arrow keys too: pins, corners, and the middles between corners.
 
 import { announce, strideOf } from "./crosshair.js";
+import { inWords } from "./cursor.js";
 
 const L = window.L;
 
@@ -32,8 +33,15 @@ function move(map, marker, stride) {
   if (!map.getBounds().contains(marker.getLatLng())) {
     map.panTo(marker.getLatLng(), { animate: false });
   }
-  const { lat, lng } = marker.getLatLng();
-  return announce(`Moved to ${lat.toFixed(6)}, ${lng.toFixed(6)}`);
+  return tellPlace(marker);
+}
+
+/** Say where it is now, unless it has moved on meanwhile.
+ * @param {any} marker */
+async function tellPlace(marker) {
+  const at = marker.getLatLng();
+  const words = await inWords(at);
+  if (marker.getLatLng().equals(at)) announce(`Moved to ${words}`);
 }
 
 /** Make a corner of the middle of a side.
@@ -51,7 +59,7 @@ function remove(map, marker) {
   marker.fire("contextmenu");
   const gone = !map.hasLayer(marker);
   if (gone) map.getContainer().focus();
-  announce(gone ? "Corner removed." : "Ground needs three corners.");
+  announce(gone ? "Corner removed." : "Ground needs three corners, a line two.");
 }
 
 /** The plugin's handles are buttons without names; each gets one.

@@ -1,5 +1,6 @@
 // News from the field: what stands, one click to take it back, and a form for more.
 
+import { inWords } from "./cursor.js";
 import { $, make, say } from "./dom.js";
 import { ask } from "./link.js";
 import { tell } from "./orders.js";
@@ -115,14 +116,14 @@ let placing = false;
 /** Let a click on the map fill the form in while it is open.
  * @param {any} map */
 export function placeByClick(map) {
-  map.on("click", (/** @type {{ latlng: { lat: number, lng: number } }} */ { latlng }) => {
+  map.on("click", async (/** @type {{ latlng: { lat: number, lng: number } }} */ { latlng }) => {
     if (!$("news-form").open) return;
     $("news-lat").value = latlng.lat.toFixed(6);
     $("news-lon").value = latlng.lng.toFixed(6);
     if (!placing) return;
     placing = false;
-    tell(`The place is ${latlng.lat.toFixed(6)}, ${latlng.lng.toFixed(6)}`);
     $("news-metres").focus();
+    tell(`The place is ${await inWords(latlng)}`);
   });
 }
 

@@ -1,7 +1,8 @@
-// Drawing a search: ground, exclusions, likely places, launch; saved as the area file and started from here.
+// Drawing a search: ground, exclusions, likely ground, lines and places, launch;
+// saved as the area file and started from here.
 
 import { announce, Crosshair } from "./crosshair.js";
-import { Cursor } from "./cursor.js";
+import { showPlace, writeAs } from "./cursor.js";
 import { $, make, say } from "./dom.js";
 import { placeHandles } from "./handles.js";
 import { ask, hasToken, keepToken } from "./link.js";
@@ -36,6 +37,20 @@ const KINDS = {
     colour: "#5b2a91",
     how: "Click the corners; click the first one again to close it.",
   },
+  trail: {
+    title: "Likely line",
+    shape: "Line",
+    role: "prior",
+    colour: "#5b2a91",
+    how: "Click along the trail, river, ridge or road; click the last corner again to end it.",
+  },
+  ipp: {
+    title: "Last seen",
+    shape: "Marker",
+    role: "ipp",
+    colour: "#5b2a91",
+    how: "Click where the lost person was last known to be, then say who it is.",
+  },
   point: {
     title: "Likely place",
     shape: "Marker",
@@ -51,7 +66,26 @@ const KINDS = {
     how: "Click where it takes off and lands.",
   },
 };
-const TYPES = { Point: "Marker", Polygon: "Polygon", MultiPolygon: "Polygon" };
+const TYPES = {
+  Point: "Marker",
+  Polygon: "Polygon",
+  MultiPolygon: "Polygon",
+  LineString: "Line",
+  MultiLineString: "Line",
+};
+/** Letters of pins; any other is a question mark. @type {Record<string, string>} */
+const LETTERS = { launch: "H", ipp: "!" };
+/** What can be said of a thing, in words. @type {Record<string, string>} */
+const WORDS = {
+  name: "Name",
+  weight: "Weight",
+  sigma_m: "Within about, metres",
+  width_m: "Width, metres",
+  subject: "Who is lost",
+  terrain: "Terrain",
+};
+/** Who can be lost, with the terrains for which there are figures. @type {Record<string, string[]>} */
+let subjects = {};
 
 /** @typedef {object} Thing
  * @property {string} kind
@@ -79,10 +113,9 @@ map.pm.setGlobalOptions({
 
 /** @param {string} which */
 function mark(which) {
-  const letter = which === "launch" ? "H" : "?";
   return L.divIcon({
     className: "pin",
-    html: `<span data-kind="${which}">${letter}</span>`,
+    html: `<span data-kind="${which}">${LETTERS[which] ?? "?"}</span>`,
     iconSize: [30, 30],
   });
 }
@@ -106,8 +139,9 @@ function begin({ currentTarget, detail }) {
     templineStyle: { color: colour },
     hintlineStyle: { color: colour, dashArray: "5 5" },
     markerStyle: { icon: mark(which) },
+    allowSelfIntersection: shape === "Line", // a trail may, a border may not
   });
-  const sets = shape === "Polygon" ? "sets a corner" : "sets it";
+  const sets = shape === "Marker" ? "sets it" : "sets a corner";
   const keys = `${title}: arrow keys move the map under the cross-hair, Enter ${sets}.`;
   crosshair.begin(detail ? `${title}: ${how}` : keys, currentTarget, !detail);
 }
@@ -120,12 +154,13 @@ function makeItem(which, known) {
   const { title, role } = KINDS[which];
   const fields = {
     name: make("input", { type: "text", maxLength: 80, value: known.name ?? "" }),
-    ...(role === "prior" ? { weight: number(known.weight ?? 1, "0.001") } : {}),
+    ...(["prior", "ipp"].includes(role) ? { weight: number(known.weight ?? 1, "0.001") } : {}),
     ...(which === "point" ? { sigma_m: number(known.sigma_m ?? 50, "1") } : {}),
+    ...(which === "trail" ? { width_m: number(known.width_m ?? 60, "1") } : {}),
+    ...(which === "ipp" && !known.rings_m ? whoAndWhere(known) : {}),
   };
-  const words = { name: "Name", weight: "Weight", sigma_m: "Within about, metres" };
   const rows = Object.entries(fields).map(([name, field]) =>
-    make("label", {}, words[/** @type {keyof typeof words} */ (name)] + " ", field),
+    make("label", {}, `${WORDS[name]} `, field),
   );
   const remove = make("button", {
     type: "button",
@@ -136,6 +171,31 @@ function makeItem(which, known) {
   remove.addEventListener("click", () => drop(item));
   item.addEventListener("input", changed);
   return { item, fields };
+}
+
+/** Whoever is lost, and the ground there: only what has published figures can be chosen.
+ * @param {Record<string, any>} known */
+function whoAndWhere(known) {
+  // their names by themselves: a label around a choice counts the choices in
+  const subject = make("select", { ariaLabel: WORDS.subject }),
+    terrain = make("select", { ariaLabel: WORDS.terrain });
+  offer(subject, Object.keys(subjects), known.subject ?? "hiker");
+  subject.addEventListener("change", () => {
+    const there = subjects[subject.value];
+    offer(terrain, there, there.includes(terrain.value) ? terrain.value : there[0]);
+  });
+  offer(terrain, subjects[subject.value] ?? [], known.terrain);
+  return { subject, terrain };
+}
+
+/** Let values be chosen, and what the file has too, however it is spelt.
+ * @param {any} select
+ * @param {string[]} values
+ * @param {string | undefined} chosen */
+function offer(select, values, chosen) {
+  const all = chosen === undefined || values.includes(chosen) ? values : [chosen, ...values];
+  select.replaceChildren(...all.map((value) => make("option", { value, textContent: value })));
+  if (chosen !== undefined) select.value = chosen;
 }
 
 /** @param {number} value
@@ -153,7 +213,7 @@ function add(which, layer, known = {}) {
   things.push({ kind: which, layer, item, fields, kept: known });
   $("drawn").append(item);
   layer.addTo(map);
-  layer.pm?.enable({ allowSelfIntersection: false });
+  layer.pm?.enable({ allowSelfIntersection: KINDS[which].shape === "Line" });
   layer.on("pm:edit pm:markerdragend dragend", changed);
   changed();
 }
@@ -256,9 +316,11 @@ function load({ name, features }) {
 
 async function open() {
   try {
-    const { drawn, tiles, coordinates } = await (await ask("/api/plan")).json();
+    const told = await (await ask("/api/plan")).json();
+    const { drawn, tiles, coordinates } = told;
+    subjects = told.subjects;
     $("entry").hidden = true;
-    cursor = new Cursor(coordinates);
+    writeAs(coordinates);
     if (tiles) {
       const layer = tiles.own ? new OwnTiles(tiles.url, tiles) : L.tileLayer(tiles.url, tiles);
       layer.addTo(map);
@@ -274,14 +336,12 @@ async function open() {
   }
 }
 
-let cursor = new Cursor("degrees");
-const showPlace = (/** @type {any} */ at) => cursor.show(at);
 const crosshair = new Crosshair(map, showPlace);
 placeHandles(map, (which) => KINDS[which].title);
 
 map.on("pm:create", (/** @type {any} */ { layer }) => {
   announce(`${KINDS[kind].title}: drawn.`);
-  if (KINDS[kind].shape === "Polygon") return add(kind, layer);
+  if (KINDS[kind].shape !== "Marker") return add(kind, layer);
   layer.remove();
   return add(kind, pinAt(layer.getLatLng(), kind));
 });

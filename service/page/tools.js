@@ -1,7 +1,7 @@
 // Tools on the map: fit, follow, measure, and the place under the cursor in the team's own coordinates.
 
 import { aimByKeys } from "./aim.js";
-import { Cursor } from "./cursor.js";
+import { showPlace, writeAs } from "./cursor.js";
 import { $, say } from "./dom.js";
 
 /** @import { Chart } from "./map.js" */
@@ -50,8 +50,6 @@ class Tape {
 
 /** @type {Chart | null} */
 let chart = null;
-/** @type {Cursor | null} */
-let cursor = null;
 /** @type {Tape | null} */
 let tape = null;
 
@@ -69,10 +67,10 @@ function measure() {
  * @param {string} coordinates */
 export function placeTools(on, coordinates) {
   chart = on;
-  cursor = new Cursor(coordinates);
+  writeAs(coordinates);
   tape = new Tape(on.map);
   on.map.on("mousemove click", (/** @type {any} */ { latlng, type }) => {
-    if (!pressed("measure")) cursor?.show(latlng);
+    if (!pressed("measure")) showPlace(latlng);
     else if (type === "click") tape?.add(latlng);
   });
   on.map.on("dragstart", look); // a hand on the map wants to look elsewhere

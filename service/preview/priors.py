@@ -22,7 +22,8 @@ def added_up(area: SearchArea, grid: Grid) -> list[tuple[str, NDArray[np.float64
     searched by, because a GeoTIFF is."""
     if not area.priors:
         return []
-    parts = list(prior_parts(area, grid.frame, cell_squares(grid.frame), grid.covered, grid.searchable))
+    squares = cell_squares(grid.frame)
+    parts = list(prior_parts(area, grid.frame, squares, grid.covered, grid.searchable, grid.mobility))
     whole = np.sum(parts, axis=0)
     if not np.allclose(whole / whole.sum(), grid.prior, rtol=1e-6, atol=1e-12):
         return []

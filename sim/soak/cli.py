@@ -23,6 +23,7 @@ from types import FrameType
 from rich.console import Console
 from rich.table import Table
 
+from service.errors import Parser
 from sim.autopilot.process import AutopilotProcess
 from sim.soak import ground
 from sim.soak.flight import Outcome, SoakFlight
@@ -133,7 +134,7 @@ def _kinds(text: str) -> frozenset[str]:
 
 def main(arguments: list[str]) -> int:
     """The command line; exits 0 without a violation, else 1."""
-    parser = argparse.ArgumentParser(prog="roisearch-sim soak", description=__doc__.split("\n")[0])
+    parser = Parser(prog="roisearch-sim soak", description=__doc__.split("\n")[0])
     parser.add_argument("--minutes", type=float, default=60.0, help="wall time after which no flight begins")
     parser.add_argument("--seed", type=int, default=1, help="seed of the first flight; the next has the next")
     parser.add_argument(

@@ -8,7 +8,6 @@ Counted: reports of an honest detector that were acknowledged, and are not in th
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import getpass
 import json
@@ -31,6 +30,7 @@ import httpx
 from rich.console import Console
 from rich.table import Table
 
+from service.errors import Parser
 from service.journal import read_rows
 from sim.autopilot.process import AutopilotProcess
 from sim.detector import Detector
@@ -238,7 +238,7 @@ def _count(folder: Path, figures: Figures) -> None:
 
 def main(arguments: list[str]) -> int:
     """Measure and print; with `--check` 1 when a bound is missed."""
-    parser = argparse.ArgumentParser(prog="roisearch-sim bench strangers", description=__doc__.split("\n")[0])
+    parser = Parser(prog="roisearch-sim bench strangers", description=__doc__.split("\n")[0])
     parser.add_argument("--holds", type=int, default=8, help="how often Hold is pressed (default 8)")
     parser.add_argument("--side", type=float, default=6000.0, help="metres of the square (default 6000)")
     parser.add_argument("--only", action="append", choices=list(attacks.KINDS), help="only this attack")

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
+from service.errors import Parser
 from sim.trials.aside import add_how, fly_the_rest, in_its_journal
 from sim.trials.battery import BATTERY, BatteryCampaign, run_battery, warm_up
 from sim.trials.battery_report import write_battery_report
@@ -24,7 +25,7 @@ def is_battery(arguments: Sequence[str]) -> bool:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-sim trials --preset battery",
         description="The probability found within one battery, by the default that is cut off and by the default that "
         "plans the battery's end. Run again with the same --out, it continues where it ended.",

@@ -15,6 +15,7 @@ from rich.progress import Progress, TaskID
 from rich.table import Table
 
 from roisearch import PLANNERS
+from service.errors import Parser
 from sim.progress import Rest, bars, span
 from sim.trials.battery_cli import is_battery
 from sim.trials.battery_cli import main as battery
@@ -44,7 +45,7 @@ _BOUNDS = "bounds"
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-sim trials",
         description="Search many random priors with each planner, and report steps, detection curves, times and how "
         "far above the bound they are. Run again with the same --out, it continues where it ended, and takes planners "

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from service.errors import Parser
 from sim.trials.aside import add_how, fly_the_rest, in_its_journal
 from sim.trials.campaign import Job
 from sim.trials.fleet import BOUND, FIRST, FLEET, WAYS, FleetCampaign, run_fleet
@@ -28,7 +29,7 @@ def is_fleet(arguments: Sequence[str]) -> bool:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-sim trials --searchers N",
         description="Let several searchers search the paper's priors together, from one corner, and compare their "
         "expected time with one searcher's, with the bound and with baselines. Run again with the same --out, it "

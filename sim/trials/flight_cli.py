@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
+from service.errors import Parser
 from sim.trials.aside import add_how, fly_the_rest, in_its_journal
 from sim.trials.flight import HELD_OUT, PLANNERS, SCENES, FlightCampaign, run_flight, warm_up
 from sim.trials.flight_report import write_flight_report
@@ -23,7 +24,7 @@ def is_flight(arguments: Sequence[str]) -> bool:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-sim trials --preset flight",
         description="Fly planners over areas, a trail and the paper's priors, and compare them in seconds: first true "
         "detection, until FOUND, times to POS, above the release bound. Run again with the same --out, it continues "

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
+from service.errors import Parser
 from sim.trials.aside import add_how, fly_the_rest, in_its_journal
 from sim.trials.flight import HELD_OUT
 from sim.trials.journal import Journal
@@ -26,7 +27,7 @@ def is_walking(arguments: Sequence[str]) -> bool:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    p = argparse.ArgumentParser(
+    p = Parser(
         prog="roisearch-sim trials --preset walking",
         description="The expected time until a target that walks is detected, and what one battery finds, by the "
         "default planner that knows how it walks, the same that takes it as still, and the survey. Run again with the "

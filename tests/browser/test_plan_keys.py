@@ -120,6 +120,44 @@ def test_a_border_that_would_cross_itself_is_refused_in_words_and_closes_on_its_
     assert len(ground["geometry"]["coordinates"][0]) == 4  # three corners, and the first again
 
 
+def test_a_line_is_drawn_by_keys_and_may_cross_itself(keys: Keyboard, paper: Board) -> None:
+    page, press = keys.page, keys.page.keyboard.press
+    keys.draw(GROUND, *CORNERS)
+    keys.press(drawing(keys.watch, "Likely line"))
+    press("Enter")
+    press("Enter")
+    expect(said(keys)).to_have_text("There is a corner here already. A line needs two corners.")
+    for way in ((3, 0), (0, 3), (-1, -5)):
+        keys.go(way)
+        press("Enter")
+    press("Backspace")
+    expect(said(keys)).to_have_text("Taken back; 3 corners left.")
+    press("Enter")
+    expect(page.get_by_role("button", name="End")).to_be_visible()
+    press("Enter")
+    expect(said(keys)).to_have_text("Likely line: drawn.")
+    expect(drawing(keys.watch, "Likely line")).to_be_focused()
+    _, line = saved(keys, paper)
+    assert line["geometry"]["type"] == "LineString"
+    assert len(line["geometry"]["coordinates"]) == 4
+    assert line["properties"] == {"role": "prior", "name": "", "weight": 1, "width_m": 60}
+
+
+def test_places_are_read_out_as_the_team_writes_them(chromium: Browser, tmp_path: Path) -> None:
+    with board(tmp_path / "area.geojson", "mgrs") as paper:
+        hand = Keyboard(chromium, paper.url)
+        go_there(hand)
+        hand.press(drawing(hand.watch, "Launch"))
+        hand.page.keyboard.press("Shift+ArrowRight")
+        expect(said(hand)).to_have_text(re.compile(r"^30V UH \d{5} \d{5}$"))
+        hand.page.keyboard.press("Enter")
+        expect(said(hand)).to_have_text("Launch: drawn.")
+        hand.reach(handles(hand, "Launch; arrow keys move it"))
+        hand.page.keyboard.press("Shift+ArrowRight")
+        expect(said(hand)).to_have_text(re.compile(r"^Moved to 30V UH \d{5} \d{5}$"))
+        hand.close()
+
+
 def test_pins_and_corners_are_moved_by_arrow_keys(keys: Keyboard, paper: Board) -> None:
     keys.draw(GROUND, *CORNERS)
     keys.draw("Launch", (2, -2))
@@ -148,7 +186,7 @@ def test_corners_are_added_and_removed_by_keys(keys: Keyboard, paper: Board) -> 
         keys.reach(handles(keys, "corner; arrow keys move it").last)
         keys.page.keyboard.press("Delete")
         expect(handles(keys, "corner; arrow keys move it")).to_have_count(left)
-    expect(said(keys)).to_have_text("Ground needs three corners.")
+    expect(said(keys)).to_have_text("Ground needs three corners, a line two.")
     (ground,) = saved(keys, paper)
     assert len(ground["geometry"]["coordinates"][0]) == 4
 

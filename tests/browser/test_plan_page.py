@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, expect
 
-from service.area import read_area
+from service.area import LinePrior, RingPrior, read_area
 from tests.integration.flight import running
 
 from .scripted import Board, board
@@ -58,14 +58,31 @@ def test_a_search_is_drawn_moved_and_saved(chromium: Browser, paper: Board) -> N
     draw(watch, "Launch", (420, 330))
     draw(watch, "Launch", (410, 325))  # there is one launch: the second takes the place of the first
     draw(watch, "Never fly here", (450, 265), (510, 265), (510, 278), (450, 265))
-    expect(page.locator("#drawn li")).to_have_count(4)
+    crossing = ((410, 300), (470, 320), (470, 300), (430, 330), (430, 330))  # as a trail may
+    draw(watch, "Likely line", *crossing)
+    draw(watch, "Last seen", (430, 280))
+    expect(page.locator("#drawn li")).to_have_count(6)
     page.get_by_label("Within about, metres").fill("40")
+    page.get_by_label("Width, metres").fill("30")
+    terrain = page.get_by_label("Terrain", exact=True)
+    page.get_by_label("Who is lost", exact=True).select_option("autistic")
+    assert terrain.locator("option").all_inner_texts()[0] == "urban"
+    page.get_by_label("Who is lost", exact=True).select_option(
+        "hiker"
+    )  # there are no figures of hikers in towns
+    terrain.select_option("dry flat")
     page.wait_for_timeout(300)
     assert watch.violations() == []
     page.get_by_role("button", name="Save").click()
     expect(page.locator("#told")).to_contain_text("Saved in")
-    assert sorted(roles(file)) == ["exclude", "launch", "prior", "search"]
+    assert sorted(roles(file)) == ["exclude", "ipp", "launch", "prior", "prior", "search"]
     before = read_area(file)
+    kinds = {type(prior): prior for prior in before.priors}
+    line, rings = kinds[LinePrior], kinds[RingPrior]
+    assert isinstance(line, LinePrior)
+    assert isinstance(rings, RingPrior)
+    assert (line.width_m, len(line.line.geoms[0].coords)) == (30.0, 4)
+    assert rings.about == "hiker, dry flat"
     assert before.name == "Drawn moor"
     assert before.launch is not None
     pin = page.locator(".pin", has=page.locator("[data-kind=launch]")).bounding_box()
@@ -83,29 +100,35 @@ def test_a_search_is_drawn_moved_and_saved(chromium: Browser, paper: Board) -> N
     assert after.launch is not None
     assert after.launch[1] > before.launch[1]
     page.reload()
-    expect(page.locator("#drawn li")).to_have_count(4)  # what was saved is drawn on
+    expect(page.locator("#drawn li")).to_have_count(6)  # what was saved is drawn on
     page.get_by_role("button", name="Save").click()
     expect(page.locator("#told")).to_contain_text("Saved in")
+    assert read_area(file).priors == after.priors
     watch.close()
 
 
 def test_what_cannot_be_drawn_stays_in_the_file(chromium: Browser, tmp_path: Path) -> None:
     file = tmp_path / "area.geojson"
     square = [[-4.7465, 56.6065], [-4.738, 56.6065], [-4.738, 56.61], [-4.7465, 56.61], [-4.7465, 56.6065]]
-    trail = {"type": "LineString", "coordinates": square[:3]}
+    wood = {"type": "Polygon", "coordinates": [[*square[:3], square[0]]]}
+    lost = {"role": "ipp", "subject": "Child (4-6)", "terrain": "Dry, flat"}
     features = [
         {"type": "Feature", "properties": {"role": "search", "outside": 0.1},
          "geometry": {"type": "Polygon", "coordinates": [square]}},
-        {"type": "Feature", "properties": {"role": "prior", "name": "trail", "width_m": 40}, "geometry": trail},
+        {"type": "Feature", "properties": {"role": "cover", "kind": "scrub"}, "geometry": wood},
+        {"type": "Feature", "properties": lost, "geometry": {"type": "Point", "coordinates": [-4.74, 56.608]}},
     ]  # fmt: skip
     file.write_text(json.dumps({"type": "FeatureCollection", "features": features}), encoding="utf-8")
     with running("service", "plan", "--out", str(file), "--http", "127.0.0.1:0") as service:
         url = service.wait_for(r"at (http://\S+)", 60.0).group(1)
         watch = Watch(chromium, url)
-        expect(watch.page.locator("#drawn li")).to_have_count(1)
+        expect(watch.page.locator("#drawn li")).to_have_count(2)
         watch.page.get_by_role("button", name="Save").click()
         expect(watch.page.locator("#told")).to_contain_text("Saved in")
         watch.close()
     area = read_area(file)
     assert area.outside == pytest.approx(0.1)
-    assert len(area.priors) == 1
+    assert [each.kind for each in area.covers] == ["scrub"]
+    (prior,) = area.priors
+    assert isinstance(prior, RingPrior)
+    assert prior.about == "child 4-6, dry flat"  # as it is spelt in the file

@@ -115,3 +115,27 @@ def test_a_link_that_may_be_a_real_aircraft_is_warned_of_until_somebody_has_thou
             assert ("give --ground FILE, or --flat" in " ".join(capsys.readouterr().out.split())) == warned
     assert main(["--area", "config/area.geojson", *link, "--ground", str(tmp_path / "none.tif")]) == 2
     assert "there is no such height model; check ground.file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("run", "words", "said"),
+    [
+        (main, "export . --format gpxx", "argument --format: invalid choice: 'gpxx'"),
+        (main, "area", "the following arguments are required"),
+        (main, "config check", "the following arguments are required: FILE"),
+        (main, "detector frigate --mqtt m --camera c --size 3xx3", "'3xx3' is not WIDTHxHEIGHT"),
+        (simulate, "flights nowhere.geojson", "nowhere.geojson: there is no such file; check the path;"),
+        (simulate, "flights --aircraft 2 nowhere.geojson", "nowhere.geojson: there is no such file;"),
+        (simulate, "detector --service foo", "'foo' is no address; give http://HOST:PORT"),
+        (simulate, "trials --trials many", "argument --trials: invalid int value: 'many'"),
+    ],
+)
+def test_wrong_words_for_a_command_are_one_sentence(
+    run: Callable[[list[str]], int], words: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        run(words.split())
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+    assert line.endswith("--help tells more")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from service.cli import main as service_main
 from service.commands.config import main
 from service.config import KNOWN_KEYS, Settings, read_settings
 from service.errors import BadInput
@@ -105,6 +106,14 @@ def test_config_check_names_every_wrong_line_and_key(
     assert "did you mean 'flight.altitude_m'" in said[0]
     assert "'flight.speed_mps' = 900" in said[1]
     assert "http.allowed_hosts" in said[2]
+
+
+def test_config_check_names_who_cannot_be_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text('[telling]\ntak = "tcp:/x"\n')
+    assert service_main(["config", "check", str(file)]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "telling.tak = 'tcp:/x' is no TAK address; give tcp://HOST:8087" in said
 
 
 def test_config_check_tells_where_each_setting_comes_from(

@@ -108,18 +108,20 @@ def test_the_command_names_the_file_after_the_run(
     assert "--prior does nothing with --resume" in capsys.readouterr().err
 
 
-def test_what_covers_the_ground_comes_along(tmp_path: Path) -> None:
+@pytest.mark.parametrize("raster", ["cover", "mobility"])
+def test_rasters_of_the_ground_come_along(tmp_path: Path, raster: str) -> None:
     folder = run_with_files(tmp_path / "here")
-    cover = tmp_path / "forest.tif"
-    cover.write_bytes(b"as it is")
+    given = tmp_path / "forest.tif"
+    given.write_bytes(b"as it is")
     journal = Journal(folder / JOURNAL)
     settings = journal.meta("settings")
-    journal.set_meta("settings", {**settings, "ground": {**settings["ground"], "cover_file": str(cover)}})
+    ground = {**settings["ground"], f"{raster}_file": str(given)}
+    journal.set_meta("settings", {**settings, "ground": ground})
     journal.close()
     pack(folder, tmp_path / "slope.zip")
     there = unpack(tmp_path / "slope.zip", tmp_path / "runs")
-    carried = Path(stored_settings(there / JOURNAL, {}).ground.cover_file)
-    assert carried == (there / "cover.tif").resolve()
+    carried = Path(getattr(stored_settings(there / JOURNAL, {}).ground, f"{raster}_file"))
+    assert carried == (there / f"{raster}.tif").resolve()
     assert carried.read_bytes() == b"as it is"
 
 

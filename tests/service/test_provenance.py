@@ -101,23 +101,24 @@ def test_a_resumption_is_journalled_with_what_it_changes(tmp_path: Path) -> None
     assert entry.said.changed == {"flight.takeoff": True}
 
 
-def covered(folder: Path, content: bytes) -> Settings:
-    """Settings with what covers the ground in a file."""
+def covered(folder: Path, content: bytes, key: str) -> Settings:
+    """Settings with a raster of the ground in a file."""
     (folder / "forest.tif").write_bytes(content)
-    return Settings.model_validate({"ground": {"cover_file": str(folder / "forest.tif")}})
+    return Settings.model_validate({"ground": {key: str(folder / "forest.tif")}})
 
 
-def test_other_cover_is_another_search(tmp_path: Path) -> None:
-    settings = covered(tmp_path, b"dense")
+@pytest.mark.parametrize("key", ["cover_file", "mobility_file"])
+def test_another_raster_of_the_ground_is_another_search(tmp_path: Path, key: str) -> None:
+    settings = covered(tmp_path, b"dense", key)
     prints = fingerprints(tmp_path, settings)
     refuse_changed(tmp_path, settings, prints)
-    with pytest.raises(BadInput, match=r"ground\.cover_file is not what this run was begun with"):
-        refuse_changed(tmp_path, covered(tmp_path, b"sparse"), prints)
-    with pytest.raises(BadInput, match=r"ground\.cover_file is not what"):
+    with pytest.raises(BadInput, match=rf"ground\.{key} is not what this run was begun with"):
+        refuse_changed(tmp_path, covered(tmp_path, b"sparse", key), prints)
+    with pytest.raises(BadInput, match=rf"ground\.{key} is not what"):
         refuse_changed(tmp_path, Settings(), prints)
-    with pytest.raises(BadInput, match=r"ground\.cover_file is not what"):
+    with pytest.raises(BadInput, match=rf"ground\.{key} is not what"):
         refuse_changed(tmp_path, settings, fingerprints(tmp_path, Settings()))
-    del prints["ground.cover_file"]  # as early runs, which did not know what covered them
+    del prints[f"ground.{key}"]  # as early runs, which did not know of it
     refuse_changed(tmp_path, settings, prints)
 
 

@@ -14,6 +14,7 @@ import pytest
 from roisearch import BasePlanner, Belief, Decision, FieldOfView, SearchState, make_planner
 from roisearch.decision import Cell
 from roisearch.planners.own import check
+from service.cli import main as service_main
 from service.config import read_settings
 from service.errors import BadInput
 
@@ -52,6 +53,13 @@ class Through(Wanderer):
         return [(state.cell[0], state.cell[1] + 1)]
 
 
+class Astray(Wanderer):
+    """Wants to be where it is not."""
+
+    def choose(self, belief: Belief, state: SearchState, rng: np.random.Generator) -> Sequence[Cell]:
+        return [(state.cell[0] + 9, state.cell[1])]
+
+
 class Moody(Wanderer):
     """Draws from elsewhere."""
 
@@ -75,6 +83,10 @@ class Whole(Wanderer):
 
         (first, *_) = super().choose(belief, state, rng)
         return Decision((first,), "whim", 0.5, Effort(1, 0.0), remark="as I like")
+
+
+class Bare:
+    """Takes nothing."""
 
 
 class NoPlanner:
@@ -130,6 +142,30 @@ def test_settings_take_a_planner_from_outside_and_name_what_is_near(tmp_path: Pa
     assert read_settings(flags={"search.planner": "mine:Planner"}).search.planner == "mine:Planner"
     with pytest.raises(BadInput, match="there is no such planner; did you mean 'greedy'"):
         read_settings(flags={"search.planner": "gredy"})
+
+
+@pytest.mark.parametrize(
+    ("planner", "said"),
+    [
+        (
+            "nowhere:Planner",
+            "search.planner: the planner 'nowhere:Planner' cannot be had: ModuleNotFoundError",
+        ),
+        (f"{__name__}:NoPlanner", f"search.planner: '{__name__}:NoPlanner' is no planner: it has no plan"),
+        (f"{__name__}:Bare", f"search.planner: the planner '{__name__}:Bare' cannot be made: Bare() takes"),
+        (f"{__name__}:Astray", "search.planner: Astray goes from "),
+    ],
+)
+def test_what_is_wrong_with_a_planner_from_outside_is_one_sentence_before_the_flight(
+    planner: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    area = ROOT / "config" / "uniform.geojson"
+    words = ["--area", str(area), "--planner", planner, "--runs", str(tmp_path), "--http", "127.0.0.1:0"]
+    assert service_main(words) == 2
+    *_, last = capsys.readouterr().err.strip().splitlines()
+    assert last.removeprefix("roisearch-service: ").startswith(said)
+    assert service_main(["preview", "--area", str(area), "--planner", planner]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_a_module_in_the_present_folder_is_found_and_an_entry_point_too(tmp_path: Path) -> None:

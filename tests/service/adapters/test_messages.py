@@ -182,6 +182,9 @@ def test_deepstreams_full_schema_is_put_together_to_frames() -> None:
 def test_deepstreams_messages_come_as_lines_or_pretty_printed(monkeypatch: pytest.MonkeyPatch) -> None:
     text = json.dumps(minimal()) + "\n" + json.dumps(minimal("3|0|0|64|72|Person"), indent=2) + "\0"
     assert len(list(json_values(io.StringIO(text)))) == 2
+    assert list(json_values(io.StringIO(" \n"))) == []
+    with pytest.raises(BadInput, match="no JSON of DeepStream: 'hello'; pipe its messages in"):
+        list(json_values(io.StringIO("hello\n")))
     monkeypatch.setattr(sys, "stdin", io.StringIO(text))
     with taking() as taker:
         assert main(["deepstream", "--service", taker.url, "--size", "1280x720"]) == 0

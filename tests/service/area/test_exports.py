@@ -164,6 +164,16 @@ def test_area_check_tells_what_was_understood_and_writes_it(
     assert main(["area", "check", str(out)]) == 0
 
 
+def test_area_check_writes_places_as_the_team_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = tmp_path / "service.toml"
+    settings.write_text('[run]\ncoordinates = "mgrs"\n')
+    area = Path(__file__).parents[3] / "config" / "area.geojson"
+    assert main(["area", "check", str(area), "--config", str(settings)]) == 0
+    assert "launch     30V UH 93053 74988" in capsys.readouterr().out
+
+
 def test_area_check_tells_all_faults_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bad = tmp_path / "bad.geojson"
     bow = [[11.0, 47.0], [11.002, 47.002], [11.002, 47.0], [11.0, 47.002], [11.0, 47.0]]

@@ -235,6 +235,8 @@ def test_without_a_launch_point_the_search_starts_from_a_flyable_cell_and_says_s
     assert grid.flyable[grid.start]
     assert grid.frame.to_cells([grid.launch]).tolist() == [list(grid.start)]
     assert grid.notes[0].startswith("The area file has no launch point; the search starts from 4")
+    in_utm = grid_of(square(), coordinates="utm")
+    assert "the search starts from 32T " in in_utm.notes[0]
 
 
 def test_launch_can_be_given_instead_of_the_files() -> None:

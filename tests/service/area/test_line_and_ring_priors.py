@@ -102,6 +102,12 @@ def test_what_is_no_subject_or_terrain_is_told_with_what_is() -> None:
     assert "there is no subject 'hikr'; did you mean 'hiker'?" in bad(subject="hikr")
     assert "'hiker' differs by terrain; give terrain: temperate mountainous," in bad(subject="hiker")
     assert "did you mean 'dry flat'?" in bad(subject="hiker", terrain="dry flatt")
+    assert "no terrain 'mountains'; take temperate mountainous, dry mountainous" in bad(
+        subject="hiker", terrain="mountains"
+    )
+    assert "no subject 'child'; take child 1-3, child 4-6, child 7-9, child 10-12, child 13-15" in bad(
+        subject="child"
+    )
     assert "no figures for 'hiker' on 'urban' ground" in bad(subject="hiker", terrain="urban")
     assert "within which 25, 50, 75 and 95 % are found" in bad(rings_m=[1, 2, 3])
     assert "each larger than the last" in bad(rings_m=[100, 50, 200, 300])

@@ -1,6 +1,7 @@
 """Ways around exclusions: never across, never longer than needed."""
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,8 @@ def test_no_way_is_said_plainly() -> None:
         BadInput, match=r"no way from 47.0\d+, 11.0\d+ to .* around the exclusions; leave a gap"
     ):
         way_home(grid, place(0, 0), place(150, 150))
+    with pytest.raises(BadInput, match=r"no way from 32T PT \d{5} \d{5} to 32T PT"):
+        way_home(replace(grid, coordinates="mgrs"), place(0, 0), place(150, 150))
 
 
 def test_between_neighbouring_flyable_cells_every_move_is_clear() -> None:

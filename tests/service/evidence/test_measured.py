@@ -56,6 +56,15 @@ def test_few_cases_make_a_table_that_is_read_too(tmp_path: Path, passes: list[Sc
     assert table(passes)
 
 
+def test_a_threshold_that_is_no_score_is_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / "s.csv"), "--threshold", "4"])
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "argument --threshold: '4' is no score between 0 and 1" in said
+
+
 def test_frames_of_one_pass_count_once_by_their_best_score(tmp_path: Path) -> None:
     path = tmp_path / "s.csv"
     path.write_text("pass,score,there\na,0.2,1\na,,1\na,0.9,1\nb,,0\nb,,0\n", encoding="utf-8")
@@ -78,7 +87,7 @@ def test_what_cannot_be_measured_is_one_sentence(tmp_path: Path, text: str, word
     path.write_text(text, encoding="utf-8")
     with pytest.raises(BadInput, match=words):
         read_scored(path)
-    with pytest.raises(BadInput, match="cannot be read"):
+    with pytest.raises(BadInput, match="there is no such file; give a CSV"):
         read_scored(tmp_path / "none.csv")
 
 

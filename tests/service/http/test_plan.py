@@ -11,6 +11,7 @@ import httpx
 import pytest
 
 from service.area import read_area
+from service.cli import main
 from service.config import Settings
 from service.errors import BadInput
 from service.http import Access
@@ -69,3 +70,15 @@ def test_drawing_wants_the_command_token(tmp_path: Path) -> None:
     report = ask(plan, "POST", "/api/plan", FIELD, access=TOKENS, **bearer("report-token-0123456789"))
     assert report.status_code == 403
     assert not plan.file.exists()
+
+
+def test_what_cannot_be_saved_or_drawn_on_is_refused_before_anybody_draws(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["plan", "--http", "127.0.0.1:0", "--out"]
+    assert main([*words, str(tmp_path / "nowhere" / "area.geojson")]) == 2
+    assert "cannot be written there; give --out in a folder that is there" in capsys.readouterr().err
+    (tmp_path / "notes.txt").write_text("hello")
+    assert main([*words, str(tmp_path / "notes.txt")]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "notes.txt" in said

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 import pytest
 
+from service.mavlink.texts import text_messages
 from service.mission.effects import EnterGuided, Stop, Tell, WriteRow
 from service.mission.news import Judged, Order
 from service.mission.states import State
+from service.places import Coordinates, written
 from service.rows import FoundRow
-from tests.service.mission.flown import FOUND, LEFT_US, Talk, reached, searching
+from tests.service.mission.flown import FOUND, GRID, LEFT_US, Talk, reached, searching
 
 
-def over(on_found: str) -> Talk:
+def over(on_found: str, coordinates: Coordinates = "degrees") -> Talk:
     """A search that has just passed the level."""
-    talk = searching({"search": {"on_found": on_found}})
+    talk = searching({"search": {"on_found": on_found}}, grid=replace(GRID, coordinates=coordinates))
     talk.sees(found=FOUND, place_probability=FOUND.probability)
     talk.tick()
     return talk
@@ -36,11 +39,16 @@ def test_a_posterior_over_the_level_ends_the_search_unless_it_is_to_continue(on_
     assert said(talk) == 1  # and not once a tick
 
 
-def test_where_it_was_found_fits_into_one_statustext() -> None:
-    talk = over("return")
+@pytest.mark.parametrize("how", get_args(Coordinates))
+def test_where_it_was_found_is_as_the_team_writes_places_and_fits_into_one_statustext(
+    how: Coordinates,
+) -> None:
+    talk, place = over("return", how), written((FOUND.lat, FOUND.lon), how)
     (told,) = [each.text for each in talk.wanted if isinstance(each, Tell) and "FOUND" in each.text]
-    assert told.startswith(f"search FOUND: {FOUND.lat:.6f}, {FOUND.lon:.6f}")
-    assert len(told) <= 50
+    assert told.startswith(f"search FOUND: {place} p=")
+    (message,) = text_messages(told, 2, 1)
+    assert "?" not in message.text
+    assert talk.core.standing.why.startswith(f"found at {place}, p = ")
 
 
 def test_hovering_over_what_was_found_ends_with_the_energy_for_the_way_home() -> None:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -58,6 +59,31 @@ def test_a_journal_that_another_program_locks_holds_and_the_search_goes_on_after
                 await until(mission, lambda: mission.vehicle.telemetry.ground_speed_mps < 0.5)
             await until(mission, lambda: mission.state == State.SEARCHING)
             await until(mission, lambda: mission.flight.waypoints > waypoints)
+
+    asyncio.run(fly())
+
+
+def test_a_planner_that_fails_holds_the_aircraft_until_an_operator_resumes(tmp_path: Path) -> None:
+    class Broken:
+        """What a planner from outside may turn out to be."""
+
+        def plan(self, *words: Any, **options: Any) -> Any:
+            raise IndexError("cell 99")
+
+    async def fly() -> None:
+        async with aloft(tmp_path) as mission:
+            good, mission.search.ending.planner = mission.search.ending.planner, Broken()  # type: ignore[assignment]
+            await until(mission, lambda: mission.state == State.HOLDING)
+            assert mission.standing.causes == {"planner"}
+            assert mission.standing.why == "the planner fails (IndexError: cell 99)"
+            await until(mission, lambda: mission.vehicle.telemetry.ground_speed_mps < 0.5)
+            waypoints = mission.flight.waypoints
+            mission.search.ending.planner = good
+            await mission.clock.sleep(10.0)
+            assert mission.state == State.HOLDING
+            await mission.order("resume")
+            await until(mission, lambda: mission.flight.waypoints > waypoints)
+            assert mission.state == State.SEARCHING
 
     asyncio.run(fly())
 

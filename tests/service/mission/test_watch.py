@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import get_args
 
 import pytest
@@ -29,7 +30,7 @@ from service.mission.effects import LetGo, SendWaypoint, Stop, Tell, WriteRow
 from service.mission.states import MAY_MOVE, State
 from service.mission.watch import LISTENERS
 from service.rows import ModeRow, VehicleClockRow, YieldedRow
-from tests.service.mission.flown import ON_GROUND, Talk, reached, searching
+from tests.service.mission.flown import GRID, ON_GROUND, Talk, reached, searching
 
 TARGET = Target(47.0, 8.3, 415.0)
 
@@ -121,6 +122,12 @@ def test_words_that_come_after_the_failsafe_are_told_though_the_mode_changes_onc
 def test_every_mode_that_the_heartbeat_shows_is_written_down() -> None:
     talk: Talk = searching()
     assert WriteRow(ModeRow("LOITER", False)) in talk.pilot()
+
+
+def test_where_else_the_aircraft_is_sent_is_as_the_team_writes_places() -> None:
+    talk = reached(State.SEARCHING, grid=replace(GRID, coordinates="mgrs"))
+    talk.on(replaced(talk.now))
+    assert "a ground station sends the aircraft to 32T MT " in talk.core.standing.why
 
 
 def test_every_event_that_the_link_tells_has_a_listener() -> None:

@@ -16,6 +16,8 @@ from rich.progress import (
 )
 
 LINE_EVERY_S = 60.0
+_AT_ONCE_S = 1.0
+"""What is done as soon as that was kept of an earlier try, and says nothing about the rest."""
 _MEASURED_OVER_S = 6 * 3600.0
 """Rich reckons the time left from what was done lately, by default in half a minute: many a job takes longer."""
 
@@ -47,21 +49,22 @@ class Rest:
     ) -> None:
         self._console, self._total, self._clock = console, total, clock
         self._silent = beside_bars and console.is_terminal
-        self._done, self._began = 0, clock()
+        self._done, self._kept, self._began = 0, 0, clock()
         self._told = self._began
 
     def advance(self) -> None:
         """One more is done."""
         self._done += 1
         now = self._clock()
+        self._kept += now - self._began < _AT_ONCE_S
         if not self._silent and self._done < self._total and now >= self._told + LINE_EVERY_S:
             self._told = now
-            self._console.print(rest(self._done, self._total, now - self._began), highlight=False)
+            self._console.print(rest(self._done, self._total, now - self._began, self._kept), highlight=False)
 
 
-def rest(done: int, total: int, seconds: float) -> str:
-    """What is done, how long that took, and how long the rest takes at that pace."""
-    left = seconds / done * (total - done)
+def rest(done: int, total: int, seconds: float, kept: int = 0) -> str:
+    """What is done, how long that took, and how long the rest takes at the pace of what was not kept from before."""
+    left = seconds / (done - kept) * (total - done)
     return f"{done} of {total} done in {span(seconds)}, about {span(left)} left"
 
 

@@ -19,14 +19,14 @@ class Hours:
         return self.now
 
 
-def told(*, terminal: bool, beside_bars: bool, jobs: int, seconds: float) -> list[str]:
-    """What is said while jobs are done that take so long each."""
+def told(*, terminal: bool, beside_bars: bool, jobs: int, seconds: float, kept: int = 0) -> list[str]:
+    """What is said while jobs are done that take so long each, but those that are kept from before."""
     out, clock = io.StringIO(), Hours()
     rest = Rest(
         Console(file=out, force_terminal=terminal, width=80), jobs, beside_bars=beside_bars, clock=clock
     )
-    for _ in range(jobs):
-        clock.now += seconds
+    for number in range(jobs):
+        clock.now += seconds if number >= kept else 1e-3
         rest.advance()
     return out.getvalue().splitlines()
 
@@ -36,6 +36,11 @@ def test_a_log_tells_the_time_that_is_left_once_a_minute_and_not_at_the_end() ->
     assert len(lines) == 250 * 6.0 / LINE_EVERY_S - 1
     assert lines[0] == "10 of 250 done in 60 s, about 24 min left"
     assert lines[-1] == "240 of 250 done in 24 min, about 60 s left"
+
+
+def test_what_was_kept_of_an_earlier_try_does_not_make_the_rest_look_short() -> None:
+    lines = told(terminal=False, beside_bars=True, jobs=120, seconds=60.0, kept=20)
+    assert lines[0] == "21 of 120 done in 60 s, about 99 min left"
 
 
 def test_beside_bars_nothing_is_said_twice() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from typing_extensions import TypedDict  # what pydantic can read on Python 3.11
 
+from service.chances import share
 from service.mission.states import FLYING, State
 from service.reasons import Option
 
@@ -103,7 +104,7 @@ def described(place: ChoiceState) -> str:
     if away is not None:
         said.append(f"{round(away, -1):.0f} m" if away >= 10.0 else "here")
     if part is not None:
-        said.append(f"{100 * part:.0f} %" if part >= 0.01 else "under 1 %")
+        said.append(share(part))
     return ", ".join(said)
 
 

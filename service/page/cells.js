@@ -180,19 +180,27 @@ export const heatRamp = (canvas) =>
 export const podRamp = (canvas) =>
   ramp(canvas, (part) => (part ? packed(looked(), 0.12 + 0.6 * part) : 0));
 
-/** A probability for people: two digits, as a percentage.
+/** A probability for people: two digits, as a percentage; never 100 %, and never 0 % where it is more.
  * @param {number} part */
 export function percent(part) {
+  if (part >= 0.995) return "over 99 %";
   if (part >= 0.0995) return (100 * part).toFixed(0) + " %";
-  return part > 0 ? Number((100 * part).toPrecision(1)) + " %" : "0 %";
+  if (part >= 1e-5) return Number((100 * part).toPrecision(1)) + " %";
+  return part > 0 ? "under 0.001 %" : "0 %";
 }
 
-/** How sure: never 100 % where it is less.
+/** To a tenth of a percent; never 100 %.
  * @param {number} part */
-export function certainty(part) {
-  if (part < 0.995) return percent(part);
-  return part < 0.9995 ? `${(100 * part).toFixed(1)} %` : "over 99.9 %";
-}
+export const tenths = (part) => (part < 0.9995 ? `${(100 * part).toFixed(1)} %` : "over 99.9 %");
+
+/** How sure: never 100 %.
+ * @param {number} part */
+export const certainty = (part) => (part < 0.995 ? percent(part) : tenths(part));
+
+/** One figure, however small.
+ * @param {number} part */
+const tick = (part) =>
+  (100 * part).toFixed(Math.max(0, -Math.floor(Math.log10(100 * part) + 1e-9))) + " %";
 
 /** @param {number} top */
-export const heatTicks = (top) => [3, 2, 1, 0].map((decades) => percent(top / 10 ** decades));
+export const heatTicks = (top) => [3, 2, 1, 0].map((decades) => tick(top / 10 ** decades));

@@ -13,8 +13,8 @@ import { showCurve, showFacts, showPos } from "./panel.js";
 import { Replay } from "./replay.js";
 import { Run } from "./run.js";
 import { showNext, showStrip } from "./strip.js";
-import { forgetSuspects, showSuspects } from "./suspects.js";
-import { follow, placeTools } from "./tools.js";
+import { forgetSuspects, goToSuspects, showSuspects } from "./suspects.js";
+import { follow, placeTools, uncover } from "./tools.js";
 
 const SAME_CELLS = 2; // so far may a detection move and still be the same
 const FINAL = ["DONE", "ABORTED"];
@@ -64,9 +64,7 @@ function begin(scene) {
     chart?.map.remove();
     const keep = (/** @type {View} */ view) =>
       localStorage.setItem(place(scene), JSON.stringify(view));
-    chart = new Chart($("map"), run, kept(scene), keep, () =>
-      $("suspects-card").scrollIntoView({ block: "nearest" }),
-    );
+    chart = new Chart($("map"), run, kept(scene), keep, goToSuspects);
     chart.onView = showLegend;
     placeByClick(chart.map);
     placeTools(chart, scene.coordinates);
@@ -118,6 +116,7 @@ function showPlaces(state, mayOrder) {
     $("map").scrollIntoView({ block: "center" }); // on a phone the list lies below the map
   };
   const found = showFound(state, mayOrder, goTo);
+  if (found && state.found) uncover(state.found, $("found"));
   const fresh = showSuspects(state, mayOrder, SAME_CELLS * frame.cell_m, goTo);
   if (!live || !shown) return;
   if (found && state.found) alertOf("found", state.found, area);

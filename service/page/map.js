@@ -391,7 +391,7 @@ export class Chart {
     }
     this.places.addLayer(
       L.marker([found.lat, found.lon], {
-        icon: icon(FOUND, 44),
+        icon: icon(FOUND, 44, "find"),
         interactive: false,
         keyboard: false,
         alt: "found here",

@@ -95,8 +95,9 @@ $("strip").replaceChildren(
  * @param {RunState} state */
 export function showNext(state) {
   say($("next"), state.next.words);
-  say($("why"), state.why);
-  $("choices").hidden = !state.next.name;
+  const choice = !!state.next.name;
+  say($("why"), state.why || (choice ? "" : state.next.words));
+  $("choices").hidden = !choice;
   const body = $("options").tBodies[0];
   const rows = state.choices.slice(0, 6).map(({ name, distance_m, probability, chosen }) =>
     make(

@@ -21,7 +21,13 @@ from .stage import Watch
 pytestmark = pytest.mark.timeout(300)
 TABLET: dict[str, Any] = {"viewport": {"width": 820, "height": 1180}, "has_touch": True, "is_mobile": True}
 SMALL: dict[str, Any] = {"viewport": {"width": 320, "height": 568}, "has_touch": True, "is_mobile": True}
-TOOL_WORDS = re.compile(r"\b(ROI|mass|visits|footprint|index rule|posterior|rollout)\b", re.IGNORECASE)
+OFF_SCREEN = """() => [...document.querySelectorAll(":is(#orders, #tools, #found, .ground) :is(button, a)")]
+  .filter((button) => button.checkVisibility())
+  .filter((button) => {
+    const { left, right } = button.getBoundingClientRect();
+    return left < 0 || right > innerWidth;
+  }).map((button) => button.textContent)"""
+"""The buttons that reach over the edge, which a page's own width does not tell of what is fixed on it."""
 
 
 @pytest.fixture
@@ -98,7 +104,7 @@ def test_every_state_has_its_words_and_none_of_the_tools(state: State, watch: Wa
     expect(card(watch, RUIN).get_by_role("button", name="Reject")).to_be_enabled()
     page = watch.page
     page.locator("details").evaluate_all("(all) => all.forEach((each) => (each.open = true))")
-    assert not TOOL_WORDS.search(page.locator("body").inner_text())
+    watch.says_it_in_words()
     assert state not in page.locator("body").inner_text()
 
 
@@ -234,7 +240,69 @@ def test_axe_finds_nothing_in_any_theme_at_any_width(
         watch.shows(state)
         assert watch.violations() == [], state
         assert watch.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), state
+        assert watch.page.evaluate(OFF_SCREEN) == [], state
     watch.close()
+
+
+COVERED = """([name, by]) => {
+  const mark = document.querySelector(name).getBoundingClientRect();
+  const over = document.querySelector(by).getBoundingClientRect();
+  return mark.left < over.right && mark.right > over.left && mark.top < over.bottom && mark.bottom > over.top;
+}"""
+"""Whether one thing lies, in part, where another one is."""
+
+
+@pytest.mark.parametrize("width", ["desktop", "phone"])
+def test_the_headline_of_a_find_hides_it_not(chromium: Browser, search: Served, width: str) -> None:
+    watch = Watch(chromium, search.url, **WIDTHS[width])
+    watch.shows("SEARCHING")
+    box = watch.page.locator("#map").bounding_box()
+    assert box is not None
+    frame = search.run.view.ground.grid.frame
+    place = tuple(float(each) for each in frame.to_latlon([(0, frame.cols // 2)])[0])
+    search.run.find((place[0], place[1]))
+    expect(watch.page.locator(".find")).to_be_visible()
+    expect(watch.page.locator("#found")).to_be_visible()
+    assert not watch.page.evaluate(COVERED, [".find", "#found"])
+    watch.close()
+
+
+def test_on_a_phone_the_map_says_that_a_detection_waits_and_leads_to_its_card(
+    chromium: Browser, search: Served
+) -> None:
+    watch = Watch(chromium, search.url, **PHONE)
+    watch.shows("SEARCHING")
+    waits = watch.page.locator("#to-look-at")
+    expect(waits).to_be_hidden()
+    search.run.tell(suspects=[search.run.suspect(RUIN), search.run.suspect(PHONE_FIX, 0.2)])
+    expect(waits).to_have_text("2 detections to look at")
+    expect(watch.page.get_by_role("heading", name="2 detections to look at")).to_have_count(1)
+    waits.tap()
+    confirm = card(watch, RUIN).get_by_role("button", name="Confirm")
+    expect(confirm).to_be_in_viewport(ratio=1)
+    assert not watch.page.evaluate(COVERED, ["#suspects .go", "#orders"])
+    assert not watch.page.evaluate(COVERED, ["#suspects .go", "header"])
+    search.run.tell(suspects=[])
+    expect(waits).to_be_hidden()
+    watch.close()
+
+
+def test_no_number_on_the_page_says_more_than_is_known(watch: Watch, search: Served) -> None:
+    said = watch.page.evaluate(
+        """async () => {
+          const { percent, certainty, heatTicks } = await import("/page/cells.js");
+          return [[0, 1e-9, 0.00096, 0.096, 0.0996, 0.42, 0.996].map(percent), [0.994, 0.9994, 0.9997].map(certainty),
+            heatTicks(5e-6)];
+        }"""
+    )
+    parts = ["0 %", "under 0.001 %", "0.1 %", "10 %", "10 %", "42 %", "over 99 %"]
+    assert said == [
+        parts,
+        ["99 %", "99.9 %", "over 99.9 %"],
+        ["0.0000005 %", "0.000005 %", "0.00005 %", "0.0005 %"],
+    ]
+    search.run.tell(pos=0.9997)
+    expect(watch.page.locator("#pos")).to_have_text("over 99.9 %")
 
 
 def coordinates_of(watch: Watch) -> Locator:

@@ -3,7 +3,7 @@
 import { alertOf } from "./alerts.js";
 import { $, placeOf, say } from "./dom.js";
 import { several, showFleet, stillFleet } from "./fleet.js";
-import { showFound } from "./found.js";
+import { showFound, stillFound } from "./found.js";
 import { showLayers, showLegend, showScale } from "./layers.js";
 import { Events, hasToken, keepToken } from "./link.js";
 import { Chart } from "./map.js";
@@ -13,7 +13,7 @@ import { showCurve, showFacts, showPos } from "./panel.js";
 import { Replay } from "./replay.js";
 import { Run } from "./run.js";
 import { showNext, showStrip } from "./strip.js";
-import { forgetSuspects, goToSuspects, showSuspects } from "./suspects.js";
+import { forgetSuspects, goToSuspects, showSuspects, stillSuspects } from "./suspects.js";
 import { follow, placeTools, uncover } from "./tools.js";
 
 const SAME_CELLS = 2; // so far may a detection move and still be the same
@@ -26,6 +26,7 @@ let chart = null;
 /** @type {Replay | null} */
 let replay = null;
 let live = false;
+let heardAt = new Date();
 let shown = false; // something was, of this scene: from then on what comes is news
 
 /** @param {Scene} scene */
@@ -83,6 +84,7 @@ function redraw({ regions, names, drawn }) {
 /** @param {Moment} moment */
 function show(moment) {
   if (!run || !chart) return; // no scene yet
+  heardAt = new Date();
   const changed = run.take(moment);
   const { state, scene } = run;
   const mayOrder = live && !scene.read_only;
@@ -145,9 +147,12 @@ const events = new Events({
   down: () => {
     showOrders([], false);
     stillFleet();
+    stillSuspects();
+    stillFound();
     if (run?.state && FINAL.includes(run.state.state)) return void ended(run.state);
     say($("lost"), "No connection to the service; trying again. What you see is not up to date.");
     $("lost").hidden = false;
+    if (shown) say($("next"), `Last heard of at ${heardAt.toLocaleTimeString()}`);
     say($("chip"), "no connection");
     $("chip").dataset.state = "lost";
   },

@@ -167,6 +167,11 @@ function clear() {
   }
 }
 
+/** Nobody hears a word now: nothing can be judged until something is told again. */
+export function stillSuspects() {
+  for (const { buttons } of cards) for (const button of buttons.slice(1)) button.disabled = true;
+}
+
 /** Another time of a replay is another story: nothing of this one stays. */
 export function forgetSuspects() {
   cards.length = 0;

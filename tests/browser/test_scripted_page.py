@@ -6,7 +6,6 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, expect
@@ -15,26 +14,10 @@ from service.mission.states import State
 from tests.service.http.door import COMMAND, REPORT, both_tokens
 
 from .hands import PHONE, Keyboard
-from .scripted import PHONE_FIX, RUIN, Scripted, Served, served
+from .scripted import PHONE_FIX, RUIN, Scripted, Served, card, served
 from .stage import Watch
 
 pytestmark = pytest.mark.timeout(300)
-TABLET: dict[str, Any] = {"viewport": {"width": 820, "height": 1180}, "has_touch": True, "is_mobile": True}
-SMALL: dict[str, Any] = {"viewport": {"width": 320, "height": 568}, "has_touch": True, "is_mobile": True}
-OFF_SCREEN = """() => [...document.querySelectorAll(":is(#orders, #tools, #found, .ground) :is(button, a)")]
-  .filter((button) => button.checkVisibility())
-  .filter((button) => {
-    const { left, right } = button.getBoundingClientRect();
-    return left < 0 || right > innerWidth;
-  }).map((button) => button.textContent)"""
-"""The buttons that reach over the edge, which a page's own width does not tell of what is fixed on it."""
-
-
-@pytest.fixture
-def search() -> Iterator[Served]:
-    """A search that says what the test tells it."""
-    with served() as scripted:
-        yield scripted
 
 
 @pytest.fixture
@@ -53,11 +36,6 @@ def keys(chromium: Browser, search: Served) -> Iterator[Keyboard]:
     hand.watch.shows("SEARCHING")
     yield hand
     hand.close()
-
-
-def card(watch: Watch, place: tuple[float, float]) -> Locator:
-    """The card of what was seen at a place."""
-    return watch.page.locator("#suspects li").filter(has_text=f"{place[0]:.6f}, {place[1]:.6f}")
 
 
 def test_likely_places_that_are_drawn_again_take_the_place_of_the_old_ones(
@@ -194,6 +172,23 @@ def test_the_end_of_the_service_after_a_finished_run_is_no_error(chromium: Brows
         watch.context.close()
 
 
+def test_without_a_service_nothing_can_be_judged_and_what_is_shown_says_how_old_it_is(
+    chromium: Browser,
+) -> None:
+    with served() as search:
+        search.run.tell(suspects=[search.run.suspect(RUIN)])
+        search.run.find(PHONE_FIX)
+        watch = Watch(chromium, search.url, **PHONE)
+        watch.shows("SEARCHING")
+        judging = watch.page.get_by_role("button", name=re.compile("^(Confirm|Reject) "))
+        expect(judging).to_have_count(4)
+        search.end()
+        expect(watch.page.locator("#lost")).to_be_visible()
+        expect(watch.page.locator("#next")).to_have_text(re.compile(r"^Last heard of at \d+:\d\d"))
+        assert [each.is_enabled() for each in judging.all()] == [False] * 4
+        watch.context.close()
+
+
 def test_a_token_that_only_looks_on_opens_the_page_without_orders(chromium: Browser) -> None:
     with served(
         environment={**both_tokens(), "ROISEARCH_HTTP_VIEW_TOKEN": "view-token-0123456789"}
@@ -216,75 +211,6 @@ def test_a_token_that_only_looks_on_opens_the_page_without_orders(chromium: Brow
             expect(card(watch, RUIN).get_by_role("img")).to_be_visible()
             assert watch.violations() == []
             watch.context.close()
-
-
-LOOKS = [(theme, width) for theme in ("day", "sun", "night") for width in ("desktop", "phone")]
-WIDTHS: dict[str, dict[str, Any]] = {"desktop": {}, "tablet": TABLET, "phone": PHONE, "small": SMALL}
-
-
-@pytest.mark.parametrize(("theme", "width"), [*LOOKS, ("day", "tablet"), ("day", "small")])
-def test_axe_finds_nothing_in_any_theme_at_any_width(
-    chromium: Browser, search: Served, theme: str, width: str
-) -> None:
-    watch = Watch(chromium, search.url, **WIDTHS[width])
-    watch.shows("SEARCHING")
-    watch.page.locator("#theme").select_option(theme)
-    watch.page.locator("details").evaluate_all("(all) => all.forEach((each) => (each.open = true))")
-    search.run.tell(suspects=[search.run.suspect(RUIN), search.run.suspect(PHONE_FIX, picture=False)])
-    for state in State:
-        if state in (State.FOUND, State.DONE):
-            search.run.find(PHONE_FIX)
-        else:
-            search.run.tell(found=None)
-        search.run.be(state, why="because")
-        watch.shows(state)
-        assert watch.violations() == [], state
-        assert watch.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), state
-        assert watch.page.evaluate(OFF_SCREEN) == [], state
-    watch.close()
-
-
-COVERED = """([name, by]) => {
-  const mark = document.querySelector(name).getBoundingClientRect();
-  const over = document.querySelector(by).getBoundingClientRect();
-  return mark.left < over.right && mark.right > over.left && mark.top < over.bottom && mark.bottom > over.top;
-}"""
-"""Whether one thing lies, in part, where another one is."""
-
-
-@pytest.mark.parametrize("width", ["desktop", "phone"])
-def test_the_headline_of_a_find_hides_it_not(chromium: Browser, search: Served, width: str) -> None:
-    watch = Watch(chromium, search.url, **WIDTHS[width])
-    watch.shows("SEARCHING")
-    box = watch.page.locator("#map").bounding_box()
-    assert box is not None
-    frame = search.run.view.ground.grid.frame
-    place = tuple(float(each) for each in frame.to_latlon([(0, frame.cols // 2)])[0])
-    search.run.find((place[0], place[1]))
-    expect(watch.page.locator(".find")).to_be_visible()
-    expect(watch.page.locator("#found")).to_be_visible()
-    assert not watch.page.evaluate(COVERED, [".find", "#found"])
-    watch.close()
-
-
-def test_on_a_phone_the_map_says_that_a_detection_waits_and_leads_to_its_card(
-    chromium: Browser, search: Served
-) -> None:
-    watch = Watch(chromium, search.url, **PHONE)
-    watch.shows("SEARCHING")
-    waits = watch.page.locator("#to-look-at")
-    expect(waits).to_be_hidden()
-    search.run.tell(suspects=[search.run.suspect(RUIN), search.run.suspect(PHONE_FIX, 0.2)])
-    expect(waits).to_have_text("2 detections to look at")
-    expect(watch.page.get_by_role("heading", name="2 detections to look at")).to_have_count(1)
-    waits.tap()
-    confirm = card(watch, RUIN).get_by_role("button", name="Confirm")
-    expect(confirm).to_be_in_viewport(ratio=1)
-    assert not watch.page.evaluate(COVERED, ["#suspects .go", "#orders"])
-    assert not watch.page.evaluate(COVERED, ["#suspects .go", "header"])
-    search.run.tell(suspects=[])
-    expect(waits).to_be_hidden()
-    watch.close()
 
 
 def test_no_number_on_the_page_says_more_than_is_known(watch: Watch, search: Served) -> None:

@@ -98,7 +98,7 @@ function show(moment) {
   showNews(state.news, mayOrder);
   chart.draw(changed);
   follow(state);
-  if (changed.has("belief") && chart.shows === "belief") showScale(chart.top);
+  if (changed.has("belief") && chart.shows === "belief") showScale(chart.scale);
   if (changed.has("curve") || !$("curve").firstChild) showCurve(run);
   showPos(run);
   showNext(state);

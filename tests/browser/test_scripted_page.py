@@ -66,7 +66,7 @@ def test_the_strip_says_it_in_words_and_what_happens_next(watch: Watch, search: 
     expect(page.locator("#options tr.chosen")).to_contain_text("shieling ruin")
     expect(page.locator("#options")).to_contain_text("last phone fix")
     search.run.tell(battery_percent=19.0, flight_left_s=90.0, wind=None, height_above_ground_m=None)
-    expect(strip.locator(".bad")).to_have_text("19 %")
+    expect(strip.locator(".bad")).to_have_text(["19 %", "2 min left"])
     expect(strip).to_contain_text("Heightunknown")
     expect(strip).to_contain_text("Windunknown")
 
@@ -218,7 +218,7 @@ def test_no_number_on_the_page_says_more_than_is_known(watch: Watch, search: Ser
         """async () => {
           const { percent, certainty, heatTicks } = await import("/page/cells.js");
           return [[0, 1e-9, 0.00096, 0.096, 0.0996, 0.42, 0.996].map(percent), [0.994, 0.9994, 0.9997].map(certainty),
-            heatTicks(5e-6)];
+            heatTicks({ top: 5e-6, decades: 3 })];
         }"""
     )
     parts = ["0 %", "under 0.001 %", "0.1 %", "10 %", "10 %", "42 %", "over 99 %"]
@@ -317,6 +317,18 @@ def test_the_map_has_two_views_names_from_the_file_and_north(watch: Watch) -> No
     expect(page.locator(".roi.likely")).to_have_count(4)
     expect(page.locator(".roi.exclude")).to_have_text("mast")
     expect(page.get_by_role("img", name="North is up")).to_be_visible()
+
+
+def test_after_a_find_the_rest_of_the_ground_can_still_be_told_apart(watch: Watch, search: Served) -> None:
+    before = watch.painted("Heat layer")
+    run = search.run.search
+    row, col = run.place.cell
+    for _ in range(3):
+        run.belief.observe([(row, col)], [True], 0.99, 0.99)
+    assert run.belief.probability().max() > 0.999
+    expect(watch.page.locator("#ticks-belief")).to_contain_text("100 % a cell")
+    assert watch.painted("Heat layer") == before
+    expect(watch.page.locator("#ticks-belief")).to_contain_text("≤ 0.0")
 
 
 LISTEN = """() => {

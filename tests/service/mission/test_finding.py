@@ -9,7 +9,7 @@ import pytest
 
 from service.chances import sure
 from service.mavlink.texts import text_messages
-from service.mission.effects import EnterGuided, Stop, Tell, WriteRow
+from service.mission.effects import Answer, EnterGuided, Stop, Tell, WriteRow
 from service.mission.news import Judged, Order
 from service.mission.states import State
 from service.places import Coordinates, written
@@ -81,6 +81,16 @@ def test_a_confirmed_place_ends_the_search_whatever_its_probability() -> None:
     assert told == [f"search FOUND: {place.lat:.6f}, {place.lon:.6f} confirmed"]
     talk.tick()
     assert talk.state == State.RETURNING
+
+
+@pytest.mark.parametrize("state", list(State))
+def test_a_persons_word_on_a_place_is_taken_in_every_state(state: State) -> None:
+    talk = reached(state)
+    talk.sees(confirmed=True, found=FOUND)
+    assert Answer(7) in talk.on(Judged(True, FOUND, ticket=7))
+    assert talk.core.standing.found == FOUND
+    talk = reached(state)
+    assert Answer(8) in talk.on(Judged(False, None, ticket=8))
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,8 @@ def test_a_waypoint_that_may_have_been_lost_is_decided_anew_after_a_moment() -> 
 
 
 @pytest.mark.parametrize(
-    ("searched", "steps", "why"), [(1.0, 0, "searched to POS over 99.9 %"), (0.1, 40_000, "40000 steps flown")]
+    ("searched", "steps", "why"),
+    [(1.0, 0, "searched to POS over 99.9 %"), (0.1, 40_000, "40000 steps flown")],
 )
 def test_a_search_ends_when_there_is_nothing_more_to_gain(searched: float, steps: int, why: str) -> None:
     talk = searching()

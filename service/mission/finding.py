@@ -57,8 +57,8 @@ def tell(found: Found, look: Look, why: str) -> Iterator[Wish]:
     """Write down what was found; it ends the search unless that is to continue and nobody confirmed it."""
     yield WriteRow(FoundRow(found))
     if look.seen.confirmed or look.settings.search.on_found != "continue":
-        how = "confirmed" if look.seen.confirmed else f"p={found.probability:.4f}"
-        told = f"{look.chart.written((found.lat, found.lon))} {how}"  # the 50 characters of one STATUSTEXT
+        how = "" if look.seen.confirmed else f" p={found.probability:.4f}"
+        told = f"{look.chart.written((found.lat, found.lon))}{how}"  # the 50 characters of one STATUSTEXT
         yield Happen(Event.CONFIRMED, f"{_at(found, look)}: {why}", told=told)
 
 

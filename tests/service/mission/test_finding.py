@@ -78,7 +78,7 @@ def test_a_confirmed_place_ends_the_search_whatever_its_probability() -> None:
     assert (talk.state, talk.core.standing.found) == (State.FOUND, place)
     assert talk.core.standing.why.endswith(f"{place.lon:.6f}: the operator confirmed the place")
     told = [each.text for each in talk.wanted if isinstance(each, Tell) and "FOUND" in each.text]
-    assert told == [f"search FOUND: {place.lat:.6f}, {place.lon:.6f} confirmed"]
+    assert told == [f"search FOUND: {place.lat:.6f}, {place.lon:.6f}"]
     talk.tick()
     assert talk.state == State.RETURNING
 

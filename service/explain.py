@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from roisearch import Decision, Regions
 from roisearch.directions import DIRECTIONS
+from service.chances import share
 from service.geometry import Cell
 from service.reasons import Option, Reason
 
@@ -147,5 +148,5 @@ def _percent(part: float) -> str:
     """Whole percents, and one figure of what is less than one."""
     percent = 100 * part
     if percent >= 0.95 or percent == 0.0:
-        return f"{percent:.0f} %"
+        return share(part) if percent >= 1.0 else f"{percent:.0f} %"
     return f"{percent:.1g} %" if percent >= 0.001 else "under 0.001 %"

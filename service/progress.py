@@ -12,6 +12,8 @@ from rich.live import Live
 from rich.logging import RichHandler
 from rich.table import Table
 
+from service.chances import sure
+from service.mission.states import FLYING
 from service.view.state import RunState
 
 log = logging.getLogger("roisearch")
@@ -35,16 +37,16 @@ def facts(state: RunState) -> list[tuple[str, str]]:
     """The state in words: name and value."""
     battery = state["battery_percent"]
     left = state["flight_left_s"]
-    place = state["place"]
+    place, what_next = state["place"], state["next"]["words"].removeprefix("Next: ")
     return [
         ("state", state["state"]),
-        ("probability of success so far", f"{state['pos']:.1%}"),
-        ("most likely place", f"{place['probability']:.1%} at {place['written']}"),
+        ("probability of success so far", sure(state["pos"])),
+        ("most likely place", f"{sure(place['probability'])} at {place['written']}"),
         ("steps", str(state["steps"])),
         ("in the air", f"{state['flight_time_s']:.0f} s"),
         ("flight time left", "unknown" if left is None else f"about {left / 60:.0f} min"),
         ("battery", "unknown" if battery is None else f"{battery:.0f} %"),
-        ("going to", state["reason"]),
+        ("next", state["reason"] if state["state"] in FLYING else what_next),
         *((f"aircraft {one['name']}", f"{one['state']}  {one['why']}") for one in state["aircraft"][1:]),
     ]
 
@@ -54,16 +56,17 @@ def line(state: RunState) -> str:
     if len(state["aircraft"]) > 1:
         return _line_of_several(state)
     battery = state["battery_percent"]
+    going = state["reason"] if state["state"] in FLYING else ""
     return (
-        f"{state['state']:10} POS {state['pos']:6.1%}  {state['steps']:4d} steps  "
-        f"{state['flight_time_s']:5.0f} s  battery {'?' if battery is None else f'{battery:.0f}'} %  {state['reason']}"
-    )
+        f"{state['state']:10} POS {sure(state['pos']):>6}  {state['steps']:4d} steps  "
+        f"{state['flight_time_s']:5.0f} s  battery {'?' if battery is None else f'{battery:.0f}'} %  {going}"
+    ).rstrip()
 
 
 def _line_of_several(state: RunState) -> str:
     """The state as one log line that tells of each aircraft."""
     each = (f"{one['name']} {one['state']} {_percent(one['battery'])}" for one in state["aircraft"])
-    return f"POS {state['pos']:6.1%}  {'  '.join(each)}"
+    return f"POS {sure(state['pos']):>6}  {'  '.join(each)}"
 
 
 def _percent(value: float | None) -> str:

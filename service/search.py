@@ -26,6 +26,7 @@ from roisearch.planners.ending import EndingPlanner
 from roisearch.planners.ending.settings import EndingSettings
 from roisearch.walk import MOST_S
 from service.area import Grid
+from service.chances import sure
 from service.common import Common
 from service.config import Settings, each_aircraft
 from service.drawing import Drawing
@@ -363,7 +364,9 @@ class Search:
         ends = self.confirmed is not None or settings.on_found == "return"
         if ends and self.found() is not None:
             return "found"
-        return f"searched to POS {pos:.1%}" if pos >= settings.stop_at_pos * self.grid.reachable_mass else ""
+        return (
+            f"searched to POS {sure(pos)}" if pos >= settings.stop_at_pos * self.grid.reachable_mass else ""
+        )
 
     def best(self) -> Found:
         """The most likely place as it is told, with its probability and ellipse, however small that probability is."""

@@ -40,7 +40,7 @@ def check_extent(polygon: shapely.MultiPolygon, where: Where, max_area_km2: floa
     reach = float(np.hypot(*shapely.get_coordinates(corners).T).max())
     if reach > REACH_M:
         raise where.bad(
-            f"the area reaches {reach / 1000:.3g} km from its centre, more than {REACH_M / 1000:g} km; "
+            f"the area reaches {reach / 1000:.1f} km from its centre, more than {REACH_M / 1000:g} km; "
             "divide it into several searches"
         )
 

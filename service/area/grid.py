@@ -18,6 +18,7 @@ from service.area.model import SearchArea, Target
 from service.area.prior import area_prior, cell_squares, covered_fraction
 from service.area.projection import FloatArray, surface_m2
 from service.area.route import KeepOut
+from service.chances import share
 from service.errors import BadInput
 from service.geometry import LatLon
 from service.ground.relief import Relief
@@ -138,7 +139,7 @@ class Grid:
         notes = self.layout_notes
         if lost.any():
             notes += (
-                f"{int(lost.sum())} cells with {100 * float(self.prior[lost].sum()):.3g} % of the prior are not flown: "
+                f"{int(lost.sum())} cells with {share(float(self.prior[lost].sum()))} of the prior are not flown: "
                 f"{why}.",
             )
         start = nearest_flyable(self.frame, flyable, self.launch)
@@ -391,10 +392,10 @@ def _reachable_part(
                 "the launch point cannot reach the area without crossing an exclusion; move it or leave a gap"
             )
     if count > 1:
-        lost = 100 * float(prior[allowed & ~part].sum())
+        lost = float(prior[allowed & ~part].sum())
         notes += (
             f"The cells that may be flown over fall into {count} separate parts; only the one with "
-            f"{100 * float(prior[part].sum()):.3g} % of the prior is flown, {lost:.3g} % lies in the others.",
+            f"{share(float(prior[part].sum()))} of the prior is flown, {share(lost)} lies in the others.",
         )
     return part, launch, notes
 
@@ -405,7 +406,7 @@ def _prior_notes(prior: FloatArray, searchable: BoolArray, flyable: BoolArray) -
     if unseen >= 0.05:
         notes += (
             f"{unseen:.3g} % of the prior lies in cells that may not be flown over; "
-            "only a footprint wider than one cell can look there.",
+            "only a camera that sees more than one cell can look there.",
         )
     empty = int((searchable & (prior < _NO_MASS)).sum())
     if empty:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from roisearch import Belief
 from service.area import Grid, SearchArea
 from service.area.frame import GridFrame
-from service.chances import sure
+from service.chances import share, sure
 from service.config import Settings
 from service.geometry import LatLon
 from service.mission.states import FINAL
@@ -169,7 +169,7 @@ class Run:
     @property
     def summary(self) -> str:
         """How it stands, in one sentence."""
-        done = f"probability of success {self.pos:.0%} after {self.looks} looks"
+        done = f"probability of success {share(self.pos)} after {self.looks} looks"
         if self.find is not None:
             place = self.written(self.find.lat, self.find.lon)
             how = "confirmed by an operator" if self.find.confirmed else f"{sure(self.find.probability)} sure"

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from service.chances import sure
+from service.chances import share, sure
 from service.export.features import iso
 from service.export.gaps import Gap, find_gaps
 from service.export.model import Detection, Run
@@ -61,6 +61,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
         "it is that the looks so far would have found it there. North is up.</p>",
         _numbers(run),
         '<section class="appendix">',
+        "<h2>Likely places</h2>",
         _regions(run),
         "<h2>Where not</h2>",
         *_where_not(run, gaps, wishes),
@@ -109,8 +110,8 @@ def _lead(run: Run) -> str:
     lat, lon = run.frame.to_latlon([(row, col)])[0]
     text = (
         f"<strong>Not found.</strong> If the target is where the search assumed it to be, it would have been "
-        f"detected by now with a probability of <strong>{run.pos:.0%}</strong>. It is outside the area with "
-        f"{run.belief.outside:.0%}. The most likely cell is at {run.written(lat, lon)}, with {run.poa.max():.1%}."
+        f"detected by now with a probability of <strong>{share(run.pos)}</strong>. It is outside the area with "
+        f"{share(run.belief.outside)}. The most likely cell is at {run.written(lat, lon)}, with {sure(run.poa.max())}."
     )
     return f'<p class="lead">{text}</p>'
 
@@ -123,20 +124,29 @@ def _numbers(run: Run) -> str:
     well = float(covered[run.pod >= WELL].sum()) * hectare
     flown = sum(piece[-1].time - piece[0].time for piece in run.track)
     rows = [
-        ("probability of success so far (POS)", f"{run.pos:.1%}"),
+        ("probability of success so far (POS)", sure(run.pos)),
         (
             "ground to search",
             f"{ground:.1f} ha in {int(run.grid.searchable.sum())} cells of {run.frame.cell_m:g} m",
         ),
-        ("looked at least once", f"{looked:.1f} ha ({looked / ground:.0%})"),
-        (f"searched well (POD {WELL:.0%} or more)", f"{well:.1f} ha ({well / ground:.0%})"),
+        ("looked at least once", f"{looked:.1f} ha ({share(looked / ground)})"),
+        (f"searched well (POD {share(WELL)} or more)", f"{well:.1f} ha ({share(well / ground)})"),
         ("flown", f"{run.flown_m / 1000:.1f} km in {flown / 60:.0f} min, as far as reports came"),
         (
             "frames looked at",
-            f"{run.reports}, which made {run.looks} looks at cells and {len(run.hits)} hits",
+            f"{run.reports}, which made {_count(run.looks, 'look')} at cells and "
+            f"{_count(len(run.hits), 'hit')}",
         ),
     ]
     return _table("The search in numbers", ("", ""), rows, head=False)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("" if number == 1 else "s")
+
+
+def _together(gaps: int) -> str:
+    return "There is one; it holds" if gaps == 1 else f"There are {gaps}; together they hold"
 
 
 def _regions(run: Run) -> str:
@@ -147,7 +157,7 @@ def _regions(run: Run) -> str:
         first, now = float(run.grid.prior[inside].sum()), float(run.poa[inside].sum())
         before = first * (1.0 - run.grid.outside)
         pod = float((run.grid.prior[inside] * run.pod[inside]).sum() / first) if first > 0.0 else 0.0
-        rows.append((run.region_names[number - 1], f"{before:.1%}", f"{now:.1%}", f"{pod:.0%}"))
+        rows.append((run.region_names[number - 1], sure(before), sure(now), share(pod)))
     if not rows:
         return "<p>No place stood out before the search: the probability was spread evenly.</p>"
     heads = (
@@ -160,23 +170,24 @@ def _regions(run: Run) -> str:
 
 
 def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
-    level = f"a POD below {wishes.pod_below:.0%} and {wishes.poa_above:g} times an average cell's probability or more"
+    average = f"{wishes.poa_above:g} times an average cell's probability"
+    level = f"a POD below {share(wishes.pod_below)} and {average} or more"
     if not gaps:
         yield f"<p>{_no_gap(run, level)}</p>"
     else:
         total = sum(gap.poa for gap in gaps)
         yield (
-            f"<p>A gap is ground with {level}. There are {len(gaps)}; together they hold {total:.1%} of "
-            "the probability. Exported as GeoJSON or KML they are polygons, as a plan a mission.</p>"
+            f"<p>A gap is ground with {level}. {_together(len(gaps))} {sure(total)} of the "
+            " probability. Exported as GeoJSON or KML they are polygons, as a plan a mission.</p>"
         )
     yield _picture(draw_gaps(run, gaps, wishes), "A map of the gaps, numbered as in the table")
     if gaps:
         rows = (
             (
                 str(number),
-                f"{gap.poa:.1%}",
+                sure(gap.poa),
                 f"{gap.area_m2 / 1e4:.2f} ha",
-                f"{gap.pod:.0%}",
+                share(gap.pod),
                 run.written(*gap.middle),
                 "" if gap.flyable else "may not be flown over",
             )
@@ -195,7 +206,7 @@ def _no_gap(run: Run, level: str) -> str:
         return f"There is no gap left: no ground has {level}."
     left = float(run.poa[ground & (run.pod <= 0.0)].sum())
     return (
-        f"{max(never, 0.01):.0%} of the ground was not searched at all; {left:.1%} of the probability lies there. None "
+        f"{share(never)} of the ground was not searched at all; {sure(left)} of the probability lies there. None "
         f"of it counts as a gap to fly again, which has {level}."
     )
 
@@ -214,7 +225,7 @@ def _what_was_found(run: Run) -> Iterable[str]:
             f"{max(one.score for one in each):.2f}",
             run.written(each[0].lat, each[0].lon),
             each[0].source,
-            f"{len(each)} frame" + ("s" if len(each) > 1 else ""),
+            _count(len(each), "frame"),
             "a hit on the map"
             if any(one.counted for one in each)
             else "not over ground that was being looked at",
@@ -262,8 +273,8 @@ def _words(run: Run) -> str:
         "POD, probability of detection: how probable it is that the looks so far would have found it there.",
         "POS, probability of success: how probable it is that the search so far would have found it. "
         "It counts what the search assumed before it began; a wrong assumption makes it wrong.",
-        f"A look finds a target that is there with {sensor.p_tp:.0%} and raises a false alarm with "
-        f"{1 - sensor.p_tn:.0%}, as the settings say of the detector.",
+        f"A look finds a target that is there with {sure(sensor.p_tp)} and raises a false alarm with "
+        f"{sure(1 - sensor.p_tn)}, as the settings say of the detector.",
         f"Flown {flight.altitude_m:g} m above the launch point at {flight.speed_mps:g} m/s; decided by "
         f"{run.settings.search.planner}.",
         *run.grid.notes,

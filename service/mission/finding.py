@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from service.chances import sure
 from service.evidence.found import Found
 from service.geometry import distance_m
 from service.mission.effects import Stop, WriteRow
@@ -27,7 +28,7 @@ def found_now(look: Look) -> Iterator[Wish]:
     known, found = look.standing.found, look.seen.found
     yield Find(found)
     if found is not None and (known is None or (known.lat, known.lon) != (found.lat, found.lon)):
-        yield from tell(found, look, "the posterior passed search.found_at")
+        yield from tell(found, look, "sure enough to end the search")
 
 
 def found_after_all(look: Look) -> Iterator[Wish]:
@@ -56,13 +57,15 @@ def tell(found: Found, look: Look, why: str) -> Iterator[Wish]:
     """Write down what was found; it ends the search unless that is to continue and nobody confirmed it."""
     yield WriteRow(FoundRow(found))
     if look.seen.confirmed or look.settings.search.on_found != "continue":
-        place = look.chart.written((found.lat, found.lon))
-        told = f"{place} p={found.probability:.4f}"  # the 50 characters of one STATUSTEXT
+        how = "" if look.seen.confirmed else f" p={found.probability:.4f}"
+        told = f"{look.chart.written((found.lat, found.lon))}{how}"  # the 50 characters of one STATUSTEXT
         yield Happen(Event.CONFIRMED, f"{_at(found, look)}: {why}", told=told)
 
 
 def _at(found: Found, look: Look) -> str:
-    return f"found at {look.chart.written((found.lat, found.lon))}, p = {found.probability:.4f}"
+    """Where, and how sure; a person who has confirmed it is."""
+    place = look.chart.written((found.lat, found.lon))
+    return f"found at {place}" + ("" if look.seen.confirmed else f", {sure(found.probability)} sure")
 
 
 def over_for_all(look: Look) -> Iterator[Wish]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from roisearch.motion import Leg
+from service.chances import share, sure
 from service.geometry import Cell, LatLon
 from service.mavlink.telemetry import Telemetry
 from service.mission.aside import Aside
@@ -166,11 +167,13 @@ class Searching(Phase):
         yield from found_now(look)
         suspect = seen.place_probability >= SUSPECT_AT
         if suspect:
-            yield Happen(Event.SUSPECT, f"a place with probability {seen.place_probability:.0%}")
+            yield Happen(
+                Event.SUSPECT, f"something at a place that is {share(seen.place_probability)} probable"
+            )
         elif seen.place_probability < CLEARED_BELOW:
-            yield Happen(Event.CLEARED, "nothing there")
+            yield Happen(Event.CLEARED, f"the place is no longer likely, {share(seen.place_probability)}")
         if seen.searched >= self._enough and look.standing.state == State.SEARCHING and not suspect:
-            yield _searched(f"searched to POS {seen.searched:.1%}")
+            yield _searched(f"searched to POS {sure(seen.searched)}")
         elif look.flight.steps >= settings.search.max_steps:
             yield _searched(f"{look.flight.steps} steps flown")
         elif look.detector_silent():

@@ -96,7 +96,8 @@ const HEAT_AT_NIGHT = [
   [254, 178, 76],
   [255, 244, 190],
 ];
-const DECADES = 3;
+const DECADES = 3,
+  MOST_DECADES = 9;
 
 /** The colour of a place on the scale: pale for long, so that what stands out does.
  * @param {Colour[]} stops
@@ -125,24 +126,31 @@ const heat = () => (isNight() ? HEAT_AT_NIGHT : HEAT);
 /** @param {number} part */
 const heatAlpha = (part) => 0.15 + 0.72 * Math.min(1, part * 1.25);
 
-/** The largest probability on the scale: the peak, rounded up to 1, 2 or 5, so that colours do not flicker.
- * @param {Run} run */
-export function topOf(run) {
-  const peak = run.probability(run.codes.reduce((most, code) => Math.max(most, code), 0));
+/** What the colours mean: the largest probability on the scale, and how many decades it goes down from there.
+ * @typedef {{ top: number, decades: number }} Scale */
+
+/** The scale of a belief: its peak, rounded up to 1, 2 or 5, so that colours do not flicker; and three decades, or as
+ * many as it takes to tell the ground apart where one cell holds nearly all, as after a find.
+ * @param {Run} run
+ * @returns {Scale} */
+export function scaleOf(run) {
+  const known = run.codes.filter((code) => code > 0).sort();
+  const peak = run.probability(known.at(-1) ?? 0),
+    low = run.probability(known[Math.floor(known.length / 4)] ?? 0);
   const decade = 10 ** Math.floor(Math.log10(peak || 1));
-  return Math.min(
-    1,
-    [1, 2, 5, 10].map((each) => each * decade).find((each) => each >= peak * 0.999) ?? 1,
-  );
+  const steps = [1, 2, 5, 10].map((each) => each * decade);
+  const top = Math.min(1, steps.find((each) => each >= peak * 0.999) ?? 1);
+  const reach = DECADES * Math.ceil(Math.log10(peak / low) / DECADES || 1);
+  return { top, decades: Math.min(MOST_DECADES, Math.max(DECADES, reach)) };
 }
 
-/** A colour for each code of the belief: logarithmic, three decades down from `top`.
+/** A colour for each code of the belief: logarithmic, down from the top of the scale.
  * @param {Run} run
- * @param {number} top */
-export function heatColours(run, top) {
+ * @param {Scale} scale */
+export function heatColours(run, { top, decades }) {
   const colours = new Uint32Array(256);
   for (let code = 1; code < 256; code++) {
-    const part = 1 + Math.log10(run.probability(code) / top) / DECADES;
+    const part = 1 + Math.log10(run.probability(code) / top) / decades;
     colours[code] = part <= 0 ? 0 : packed(mix(heat(), part), heatAlpha(part));
   }
   return colours;
@@ -180,19 +188,28 @@ export const heatRamp = (canvas) =>
 export const podRamp = (canvas) =>
   ramp(canvas, (part) => (part ? packed(looked(), 0.12 + 0.6 * part) : 0));
 
-/** A probability for people: two digits, as a percentage.
+/** A probability for people: two digits, as a percentage; never 100 %, and never 0 % where it is more.
  * @param {number} part */
 export function percent(part) {
+  if (part >= 0.995) return "over 99 %";
   if (part >= 0.0995) return (100 * part).toFixed(0) + " %";
-  return part > 0 ? Number((100 * part).toPrecision(1)) + " %" : "0 %";
+  if (part >= 1e-5) return Number((100 * part).toPrecision(1)) + " %";
+  return part > 0 ? "under 0.001 %" : "0 %";
 }
 
-/** How sure: never 100 % where it is less.
+/** To a tenth of a percent; never 100 %.
  * @param {number} part */
-export function certainty(part) {
-  if (part < 0.995) return percent(part);
-  return part < 0.9995 ? `${(100 * part).toFixed(1)} %` : "over 99.9 %";
-}
+export const tenths = (part) => (part < 0.9995 ? `${(100 * part).toFixed(1)} %` : "over 99.9 %");
 
-/** @param {number} top */
-export const heatTicks = (top) => [3, 2, 1, 0].map((decades) => percent(top / 10 ** decades));
+/** How sure: never 100 %.
+ * @param {number} part */
+export const certainty = (part) => (part < 0.995 ? percent(part) : tenths(part));
+
+/** One figure, however small.
+ * @param {number} part */
+const tick = (part) =>
+  (100 * part).toFixed(Math.max(0, -Math.floor(Math.log10(100 * part) + 1e-9))) + " %";
+
+/** @param {Scale} scale */
+export const heatTicks = ({ top, decades }) =>
+  [3, 2, 1, 0].map((third) => tick(top / 10 ** ((third * decades) / 3)));

@@ -33,7 +33,13 @@ export function showFound(state, mayOrder, onShow) {
     if (each.ariaLabel !== label) each.ariaLabel = label;
   }
   shown.verdict.firstChild.disabled = now.confirmed;
+  shown.verdict.lastChild.disabled = false;
   return !before;
+}
+
+/** Nobody hears a word now. */
+export function stillFound() {
+  for (const each of shown?.verdict.children ?? []) each.disabled = true;
 }
 
 /** @param {FoundState} found */

@@ -4,6 +4,7 @@ import { heatRamp, heatTicks, podRamp } from "./cells.js";
 import { $, draw, make } from "./dom.js";
 import { LAYERS } from "./map.js";
 
+/** @import { Scale } from "./cells.js" */
 /** @import { Chart } from "./map.js" */
 
 /** @param {Record<string, string | number>} attributes */
@@ -77,9 +78,9 @@ export function showLayers(chart) {
 }
 
 /** @param {Chart} chart */
-export function showLegend({ shows, top }) {
+export function showLegend({ shows, scale }) {
   $("legend").replaceChildren(legend(shows));
-  if (shows === "belief") showScale(top);
+  if (shows === "belief") showScale(scale);
 }
 
 /** @param {"belief" | "pod"} key */
@@ -103,9 +104,9 @@ function legend(key) {
 }
 
 /** The ends of the belief's scale, a cell.
- * @param {number} top */
-export function showScale(top) {
-  const texts = heatTicks(top),
+ * @param {Scale} scale */
+export function showScale(scale) {
+  const texts = heatTicks(scale),
     ticks = document.getElementById("ticks-belief"); // not there before the layers are shown
   texts[0] = "≤ " + texts[0];
   texts[3] += " a cell";

@@ -3,7 +3,7 @@
 import { alertOf } from "./alerts.js";
 import { $, placeOf, say } from "./dom.js";
 import { several, showFleet, stillFleet } from "./fleet.js";
-import { showFound } from "./found.js";
+import { showFound, stillFound } from "./found.js";
 import { showLayers, showLegend, showScale } from "./layers.js";
 import { Events, hasToken, keepToken } from "./link.js";
 import { Chart } from "./map.js";
@@ -13,8 +13,8 @@ import { showCurve, showFacts, showPos } from "./panel.js";
 import { Replay } from "./replay.js";
 import { Run } from "./run.js";
 import { showNext, showStrip } from "./strip.js";
-import { forgetSuspects, showSuspects } from "./suspects.js";
-import { follow, placeTools } from "./tools.js";
+import { forgetSuspects, goToSuspects, showSuspects, stillSuspects } from "./suspects.js";
+import { follow, placeTools, uncover } from "./tools.js";
 
 const SAME_CELLS = 2; // so far may a detection move and still be the same
 const FINAL = ["DONE", "ABORTED"];
@@ -26,6 +26,7 @@ let chart = null;
 /** @type {Replay | null} */
 let replay = null;
 let live = false;
+let heardAt = new Date();
 let shown = false; // something was, of this scene: from then on what comes is news
 
 /** @param {Scene} scene */
@@ -64,9 +65,7 @@ function begin(scene) {
     chart?.map.remove();
     const keep = (/** @type {View} */ view) =>
       localStorage.setItem(place(scene), JSON.stringify(view));
-    chart = new Chart($("map"), run, kept(scene), keep, () =>
-      $("suspects-card").scrollIntoView({ block: "nearest" }),
-    );
+    chart = new Chart($("map"), run, kept(scene), keep, goToSuspects);
     chart.onView = showLegend;
     placeByClick(chart.map);
     placeTools(chart, scene.coordinates);
@@ -85,6 +84,7 @@ function redraw({ regions, names, drawn }) {
 /** @param {Moment} moment */
 function show(moment) {
   if (!run || !chart) return; // no scene yet
+  heardAt = new Date();
   const changed = run.take(moment);
   const { state, scene } = run;
   const mayOrder = live && !scene.read_only;
@@ -98,7 +98,7 @@ function show(moment) {
   showNews(state.news, mayOrder);
   chart.draw(changed);
   follow(state);
-  if (changed.has("belief") && chart.shows === "belief") showScale(chart.top);
+  if (changed.has("belief") && chart.shows === "belief") showScale(chart.scale);
   if (changed.has("curve") || !$("curve").firstChild) showCurve(run);
   showPos(run);
   showNext(state);
@@ -118,6 +118,7 @@ function showPlaces(state, mayOrder) {
     $("map").scrollIntoView({ block: "center" }); // on a phone the list lies below the map
   };
   const found = showFound(state, mayOrder, goTo);
+  if (found && state.found) uncover(state.found, $("found"));
   const fresh = showSuspects(state, mayOrder, SAME_CELLS * frame.cell_m, goTo);
   if (!live || !shown) return;
   if (found && state.found) alertOf("found", state.found, area);
@@ -146,9 +147,12 @@ const events = new Events({
   down: () => {
     showOrders([], false);
     stillFleet();
+    stillSuspects();
+    stillFound();
     if (run?.state && FINAL.includes(run.state.state)) return void ended(run.state);
     say($("lost"), "No connection to the service; trying again. What you see is not up to date.");
     $("lost").hidden = false;
+    if (shown) say($("next"), `Last heard of at ${heardAt.toLocaleTimeString()}`);
     say($("chip"), "no connection");
     $("chip").dataset.state = "lost";
   },

@@ -1,6 +1,6 @@
 // The map: ground, area, belief, POD, regions, flight. Works without internet.
 
-import { Cells, heatColours, percent, podColours, topOf } from "./cells.js";
+import { Cells, heatColours, percent, podColours, scaleOf } from "./cells.js";
 import { several } from "./fleet.js";
 import { Flock } from "./flock.js";
 import { CRAFT, ellipse, FOUND, icon, LAUNCH, nameMark, placeNorth, SUSPECT } from "./marks.js";
@@ -37,8 +37,8 @@ export class Chart {
   shownPlaces;
   /** Several aircraft; see `make`. @type {Flock} */
   flock = /** @type {any} */ (null);
-  /** The largest probability on the scale. */
-  top = 1;
+  /** What the colours of the belief mean. */
+  scale = { top: 1, decades: 3 };
 
   /** `kept`: the view of an earlier visit, or nothing; `moved(view)` is told when the view changes.
    * @param {HTMLElement} element
@@ -280,8 +280,8 @@ export class Chart {
     const { run } = this,
       { state } = run;
     if (changed.has("belief")) {
-      this.top = topOf(run);
-      this.belief.paint(run.codes, heatColours(run, this.top));
+      this.scale = scaleOf(run);
+      this.belief.paint(run.codes, heatColours(run, this.scale));
     }
     if (changed.has("pod")) this.pod.paint(run.pod, podColours(), this.inset);
     if (changed.has("hits")) {
@@ -391,7 +391,7 @@ export class Chart {
     }
     this.places.addLayer(
       L.marker([found.lat, found.lon], {
-        icon: icon(FOUND, 44),
+        icon: icon(FOUND, 44, "find"),
         interactive: false,
         keyboard: false,
         alt: "found here",

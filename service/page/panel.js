@@ -1,6 +1,6 @@
 // The numbers beside the map.
 
-import { percent } from "./cells.js";
+import { percent, tenths } from "./cells.js";
 import { $, draw, lasting, make, say } from "./dom.js";
 
 /** @import { Run } from "./run.js" */
@@ -8,7 +8,7 @@ import { $, draw, lasting, make, say } from "./dom.js";
 /** @param {Run} run */
 export function showPos(run) {
   const { state } = run;
-  say($("pos"), (100 * state.pos).toFixed(1) + " %");
+  say($("pos"), tenths(state.pos));
   const estimate = state.estimate;
   const wanted = (estimate?.goals ?? []).map(({ pos, reached, seconds }) => [
     `to ${Math.round(100 * pos)} %`,

@@ -7,14 +7,13 @@ const SIDES = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 
 /** Battery and the time that it leaves.
  * @param {RunState} state
- * @returns {string[]} */
+ * @returns {string[]} as all of these: what it is, more of it, and how bad either is */
 function battery({ battery_percent, battery_doubt, flight_left_s }) {
   const level = battery_percent === null ? "unknown" : `${Math.round(battery_percent)} %`;
   const left = flight_left_s === null ? "" : `${lasting(flight_left_s)} left`;
-  const low =
-    (battery_percent !== null && battery_percent < 25) ||
-    (flight_left_s !== null && flight_left_s < 180);
-  return [level, left, battery_doubt || low ? "bad" : ""];
+  const low = battery_percent !== null && battery_percent < 25;
+  const short = flight_left_s !== null && flight_left_s < 180;
+  return [level, left, battery_doubt || low ? "bad" : "", short ? "bad" : ""];
 }
 
 /** @param {LinkState | null} link
@@ -61,6 +60,7 @@ const height = (metres) => [
 
 /** @param {RunState} state */
 export function showStrip(state) {
+  const over = state.state === "DONE" || state.state === "ABORTED"; // nothing is alarming any more
   const told = [
       battery(state),
       linked(state.link),
@@ -69,12 +69,12 @@ export function showStrip(state) {
       blowing(state.wind),
     ],
     strip = $("strip");
-  told.forEach(([value, more, how], i) => {
+  told.forEach(([value, more, how, howMore = ""], i) => {
     const [, first, second] = strip.children[i].children;
     say(first, value);
     say(second, more || "\u00a0");
-    first.className = how;
-    second.className = "more";
+    first.className = over ? "" : how;
+    second.className = over ? "more" : `more ${howMore}`;
   });
 }
 
@@ -95,8 +95,10 @@ $("strip").replaceChildren(
  * @param {RunState} state */
 export function showNext(state) {
   say($("next"), state.next.words);
-  say($("why"), state.why);
-  $("choices").hidden = !state.next.name;
+  const choice = !!state.next.name;
+  const onItsWay = state.state === "SEARCHING" && choice; // why the search began is no news by then
+  say($("why"), onItsWay ? "" : state.why || state.next.words);
+  $("choices").hidden = !choice;
   const body = $("options").tBodies[0];
   const rows = state.choices.slice(0, 6).map(({ name, distance_m, probability, chosen }) =>
     make(

@@ -54,8 +54,21 @@ export function showSuspects(state, mayOrder, near_m, onShow) {
   });
   if (!busy()) clear();
   $("suspects-none").hidden = cards.length > 0;
+  showCount(cards.filter(({ gone }) => gone === null).length);
   return fresh;
 }
+
+/** How many wait, said on the map too where the list lies below it.
+ * @param {number} waiting */
+function showCount(waiting) {
+  const said = `${waiting} detection${waiting === 1 ? "" : "s"} to look at`;
+  say($("suspects-title"), waiting ? said : "Detections");
+  if (waiting) say($("to-look-at"), said);
+  $("to-look-at").hidden = !waiting;
+}
+
+export const goToSuspects = () => $("suspects-card").scrollIntoView({ block: "nearest" });
+$("to-look-at").addEventListener("click", goToSuspects);
 
 /** Which of some places is the same as another.
  * @param {SuspectState[]} places
@@ -152,6 +165,11 @@ function clear() {
       cards.splice(i, 1);
     }
   }
+}
+
+/** Nobody hears a word now: nothing can be judged until something is told again. */
+export function stillSuspects() {
+  for (const { buttons } of cards) for (const button of buttons.slice(1)) button.disabled = true;
 }
 
 /** Another time of a replay is another story: nothing of this one stays. */

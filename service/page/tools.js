@@ -8,6 +8,10 @@ import { $, say } from "./dom.js";
 
 const L = window.L;
 
+const CLEAR_PX = 30; // the star of a find, and a little
+/** What is said while no place is pointed at. */
+const IDLE = matchMedia("(pointer: coarse)").matches ? "tap for a place" : "–";
+
 /** @param {string} id
  * @param {boolean} pressed */
 const press = (id, pressed) => $(id).setAttribute("aria-pressed", String(pressed));
@@ -59,7 +63,7 @@ const look = () => press("follow", false);
 function measure() {
   press("measure", !pressed("measure"));
   tape?.clear();
-  say($("cursor"), pressed("measure") ? "click the first point, or Enter" : "–");
+  say($("cursor"), pressed("measure") ? "click the first point, or Enter" : IDLE);
 }
 
 /** Let the tools work on a map.
@@ -90,6 +94,20 @@ export function follow({ pose }) {
   }
 }
 
+/** Move the map down where something over its top hides a place.
+ * @param {{ lat: number, lon: number }} place
+ * @param {HTMLElement} over */
+export function uncover({ lat, lon }, over) {
+  if (!chart) return;
+  const map = chart.map.getContainer().getBoundingClientRect(),
+    hides = over.getBoundingClientRect(),
+    { x, y } = chart.map.latLngToContainerPoint([lat, lon]);
+  const beside = Math.abs(map.x + x - (hides.x + hides.width / 2)) - hides.width / 2;
+  const up = hides.bottom + CLEAR_PX - (map.y + y);
+  if (beside < CLEAR_PX && up > 0) chart.map.panBy([0, -up], { animate: false });
+}
+
+say($("cursor"), IDLE);
 $("fit").addEventListener("click", () => {
   press("follow", false);
   chart?.fit();

@@ -72,11 +72,12 @@ def _draw_times(axes: Axes, seen: Preview) -> None:
         axes.axhline(100.0 * seen.reachable, color="#b00020", lw=0.9, ls="--", label="all that can be found")
     if seen.battery_s <= longest:
         axes.axvline(seen.battery_s / 60.0, color="#8a4b00", lw=1.2, label="one battery")
-    elif seen.draws:
-        axes.plot([], [], " ", label=f"one battery lasts longer: {seen.battery_s / 60.0:.0f} min")
-    axes.set(xlim=(0, 1.02 * longest / 60.0), ylim=(0, 100), xlabel="minutes since take-off", ylabel="POS, %")
+    beyond = f" (one battery lasts {seen.battery_s / 60.0:.0f})" if seen.battery_s > longest else ""
+    axes.set(xlim=(0, 1.02 * longest / 60.0), ylim=(0, 100), ylabel="POS, %")
+    axes.set_xlabel(f"minutes since take-off{beyond}")
     axes.grid(alpha=0.25)
-    axes.legend(frameon=False, fontsize=9, loc="lower right")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False, fontsize=9, loc="lower right")
 
 
 def _draw_path(axes: Axes, seen: Preview) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from roisearch import Regions
 from service.area import SearchArea
+from service.chances import share
 from service.config import Settings, each_aircraft
 from service.evidence.found import Found
 from service.evidence.observe import FramePose
@@ -147,7 +148,12 @@ class BaseView:
 
     def next(self, state: State, options: Sequence[Option]) -> NextState:
         """What happens next, in words."""
-        return next_state(state, options, self.names(), self.region_masses())
+        again = ""
+        if state == State.CONFIRMING:  # the place as its card has it
+            best = self.search.best()
+            place = written((best.lat, best.lon), self.settings.run.coordinates)
+            again = f"{place}, {share(best.probability)}"
+        return next_state(state, options, self.names(), self.region_masses(), again)
 
     def choices(self, options: Sequence[Option]) -> list[ChoiceState]:
         """What the last decision weighed, as places with their names."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.chances import sure
+from service.chances import share, sure
 from service.view.feed import Moment
 from service.view.scene import Ground
 from service.view.shapes import area_features, cell_features, feature, line, point
@@ -73,10 +73,10 @@ def draw_map(ground: Ground, moment: Moment) -> bytes:
 
     state = moment.state
     pose, found = state["pose"], state["found"]
-    said = f"POS {state['pos']:.0%}, {state['steps']} steps, {state['flight_time_s']:.0f} s in the air"
+    said = f"POS {share(state['pos'])}, {state['steps']} steps, {state['flight_time_s']:.0f} s in the air"
     if found:
         said += f" · found at {found['written']}"
-        said += f", {sure(found['probability'])} sure"
+        said += ", confirmed by an operator" if found["confirmed"] else f", {sure(found['probability'])} sure"
     return draw_scene(
         PictureScene(
             grid=ground.grid,

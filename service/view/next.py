@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from typing_extensions import TypedDict  # what pydantic can read on Python 3.11
 
+from service.chances import share
 from service.mission.states import FLYING, State
 from service.reasons import Option
 
@@ -59,7 +60,7 @@ class ChoiceState(TypedDict):
 
 
 def next_state(
-    state: State, options: Sequence[Option], names: Sequence[str], regions: Sequence[float]
+    state: State, options: Sequence[Option], names: Sequence[str], regions: Sequence[float], again: str = ""
 ) -> NextState:
     """What happens next.
 
@@ -68,6 +69,7 @@ def next_state(
         options: what the last decision weighed.
         names: what people call the regions of interest, region 1 first.
         regions: the probability of each now.
+        again: the place that gets another look while it is confirming, in words.
     """
     if state not in FLYING:
         return {"words": _NEXT[state], "name": None, "distance_m": None, "probability": None}
@@ -75,7 +77,9 @@ def next_state(
     if chosen is None:
         words = "Next: the ground ahead"
         return {"words": words, "name": None, "distance_m": None, "probability": None}
-    words = f"Next: {_again(state)}{described(chosen)}"
+    words = f"Next: {described(chosen)}"
+    if state == State.CONFIRMING:
+        words = f"Next: another look at {again or described(chosen)}"
     return {"words": words, **{key: chosen[key] for key in ("name", "distance_m", "probability")}}  # type: ignore[typeddict-item]
 
 
@@ -103,9 +107,5 @@ def described(place: ChoiceState) -> str:
     if away is not None:
         said.append(f"{round(away, -1):.0f} m" if away >= 10.0 else "here")
     if part is not None:
-        said.append(f"{100 * part:.0f} %" if part >= 0.01 else "under 1 %")
+        said.append(share(part))
     return ", ".join(said)
-
-
-def _again(state: State) -> str:
-    return "another look at " if state == State.CONFIRMING else ""

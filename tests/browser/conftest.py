@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
+from .scripted import Served, served
 from .stage import Stage, Watch, flying
 
 ARGUMENTS = [
@@ -58,3 +59,10 @@ def watch(chromium: Browser, stage: Stage) -> Iterator[Watch]:
 def pictures() -> Path | None:
     """Where to write the README's pictures, or None."""
     return Path(PICTURES) if PICTURES else None
+
+
+@pytest.fixture
+def search() -> Iterator[Served]:
+    """A search that says what the test tells it."""
+    with served() as scripted:
+        yield scripted

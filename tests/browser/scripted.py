@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+from playwright.sync_api import Locator
 
 from service.clock import Clock
 from service.config import Settings
@@ -29,6 +30,8 @@ from service.view.live import RunView
 from service.view.next import STATE_WORDS, choices, next_state
 from service.view.state import RunState
 from tests.service.http.door import FakeRun, settings
+
+from .stage import Watch
 
 DEMO = Path(__file__).parents[2] / "config" / "area.geojson"
 PICTURE = "0" * 64 + ".jpg"
@@ -192,3 +195,8 @@ def board(file: Path, coordinates: str = "degrees") -> Iterator[Board]:
         yield opened
     finally:
         opened.end()
+
+
+def card(watch: Watch, place: tuple[float, float]) -> Locator:
+    """The card of what was seen at a place."""
+    return watch.page.locator("#suspects li").filter(has_text=f"{place[0]:.6f}, {place[1]:.6f}")

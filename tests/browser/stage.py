@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 import sqlite3
 import struct
@@ -38,6 +39,13 @@ AXE_RUN = """async () => {
   const { violations } = await axe.run(document, { resultTypes: ["violations"] });
   return violations.map(({ id, impact, nodes }) => [impact, id, nodes.map((node) => node.html.slice(0, 160))]);
 }"""
+
+
+TOOL_WORDS = re.compile(
+    r"\b(ROI|mass|visits|footprint|index rule|posterior|rollout|best rate|(search|sensor|flight)\.[a-z_]+)\b",
+    re.IGNORECASE,
+)
+"""What only somebody who has read the code would understand."""
 
 
 class Stage:
@@ -143,6 +151,11 @@ class Watch:
         self.page.evaluate(AXE.read_text(encoding="utf-8"))
         found: list[Any] = self.page.evaluate(AXE_RUN)
         return found
+
+    def says_it_in_words(self) -> None:
+        """Nothing on the page is a tool's word."""
+        body = self.page.locator("body").inner_text()
+        assert not TOOL_WORDS.search(body), body
 
     def painted(self, layer: str) -> int:
         """How many pixels of a layer of cells are not clear."""

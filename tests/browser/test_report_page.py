@@ -44,9 +44,12 @@ def test_axe_finds_nothing_in_a_report_and_it_is_no_wider_than_the_screen(
     watch.close()
 
 
-def test_in_print_what_everybody_reads_is_one_sheet(chromium: Browser, pages: dict[str, Path]) -> None:
+@pytest.mark.parametrize("name", ["found", "searched", "half"])
+def test_in_print_what_everybody_reads_is_one_sheet(
+    chromium: Browser, pages: dict[str, Path], name: str
+) -> None:
     """Of A4 less its margins: 186 mm by 273 mm, at 96 pixels an inch."""
-    watch = Watch(chromium, pages["found"].as_uri(), viewport={"width": 703, "height": 1031})
+    watch = Watch(chromium, pages[name].as_uri(), viewport={"width": 703, "height": 1031})
     watch.page.emulate_media(media="print")
     appendix = watch.page.locator(".appendix").bounding_box()
     assert appendix is not None

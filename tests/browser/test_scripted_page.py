@@ -6,7 +6,6 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, expect
@@ -15,20 +14,10 @@ from service.mission.states import State
 from tests.service.http.door import COMMAND, REPORT, both_tokens
 
 from .hands import PHONE, Keyboard
-from .scripted import PHONE_FIX, RUIN, Scripted, Served, served
+from .scripted import PHONE_FIX, RUIN, Scripted, Served, card, served
 from .stage import Watch
 
 pytestmark = pytest.mark.timeout(300)
-TABLET: dict[str, Any] = {"viewport": {"width": 820, "height": 1180}, "has_touch": True, "is_mobile": True}
-SMALL: dict[str, Any] = {"viewport": {"width": 320, "height": 568}, "has_touch": True, "is_mobile": True}
-TOOL_WORDS = re.compile(r"\b(ROI|mass|visits|footprint|index rule|posterior|rollout)\b", re.IGNORECASE)
-
-
-@pytest.fixture
-def search() -> Iterator[Served]:
-    """A search that says what the test tells it."""
-    with served() as scripted:
-        yield scripted
 
 
 @pytest.fixture
@@ -47,11 +36,6 @@ def keys(chromium: Browser, search: Served) -> Iterator[Keyboard]:
     hand.watch.shows("SEARCHING")
     yield hand
     hand.close()
-
-
-def card(watch: Watch, place: tuple[float, float]) -> Locator:
-    """The card of what was seen at a place."""
-    return watch.page.locator("#suspects li").filter(has_text=f"{place[0]:.6f}, {place[1]:.6f}")
 
 
 def test_likely_places_that_are_drawn_again_take_the_place_of_the_old_ones(
@@ -82,7 +66,7 @@ def test_the_strip_says_it_in_words_and_what_happens_next(watch: Watch, search: 
     expect(page.locator("#options tr.chosen")).to_contain_text("shieling ruin")
     expect(page.locator("#options")).to_contain_text("last phone fix")
     search.run.tell(battery_percent=19.0, flight_left_s=90.0, wind=None, height_above_ground_m=None)
-    expect(strip.locator(".bad")).to_have_text("19 %")
+    expect(strip.locator(".bad")).to_have_text(["19 %", "2 min left"])
     expect(strip).to_contain_text("Heightunknown")
     expect(strip).to_contain_text("Windunknown")
 
@@ -98,7 +82,7 @@ def test_every_state_has_its_words_and_none_of_the_tools(state: State, watch: Wa
     expect(card(watch, RUIN).get_by_role("button", name="Reject")).to_be_enabled()
     page = watch.page
     page.locator("details").evaluate_all("(all) => all.forEach((each) => (each.open = true))")
-    assert not TOOL_WORDS.search(page.locator("body").inner_text())
+    watch.says_it_in_words()
     assert state not in page.locator("body").inner_text()
 
 
@@ -188,6 +172,23 @@ def test_the_end_of_the_service_after_a_finished_run_is_no_error(chromium: Brows
         watch.context.close()
 
 
+def test_without_a_service_nothing_can_be_judged_and_what_is_shown_says_how_old_it_is(
+    chromium: Browser,
+) -> None:
+    with served() as search:
+        search.run.tell(suspects=[search.run.suspect(RUIN)])
+        search.run.find(PHONE_FIX)
+        watch = Watch(chromium, search.url, **PHONE)
+        watch.shows("SEARCHING")
+        judging = watch.page.get_by_role("button", name=re.compile("^(Confirm|Reject) "))
+        expect(judging).to_have_count(4)
+        search.end()
+        expect(watch.page.locator("#lost")).to_be_visible()
+        expect(watch.page.locator("#next")).to_have_text(re.compile(r"^Last heard of at \d+:\d\d"))
+        assert [each.is_enabled() for each in judging.all()] == [False] * 4
+        watch.context.close()
+
+
 def test_a_token_that_only_looks_on_opens_the_page_without_orders(chromium: Browser) -> None:
     with served(
         environment={**both_tokens(), "ROISEARCH_HTTP_VIEW_TOKEN": "view-token-0123456789"}
@@ -212,29 +213,22 @@ def test_a_token_that_only_looks_on_opens_the_page_without_orders(chromium: Brow
             watch.context.close()
 
 
-LOOKS = [(theme, width) for theme in ("day", "sun", "night") for width in ("desktop", "phone")]
-WIDTHS: dict[str, dict[str, Any]] = {"desktop": {}, "tablet": TABLET, "phone": PHONE, "small": SMALL}
-
-
-@pytest.mark.parametrize(("theme", "width"), [*LOOKS, ("day", "tablet"), ("day", "small")])
-def test_axe_finds_nothing_in_any_theme_at_any_width(
-    chromium: Browser, search: Served, theme: str, width: str
-) -> None:
-    watch = Watch(chromium, search.url, **WIDTHS[width])
-    watch.shows("SEARCHING")
-    watch.page.locator("#theme").select_option(theme)
-    watch.page.locator("details").evaluate_all("(all) => all.forEach((each) => (each.open = true))")
-    search.run.tell(suspects=[search.run.suspect(RUIN), search.run.suspect(PHONE_FIX, picture=False)])
-    for state in State:
-        if state in (State.FOUND, State.DONE):
-            search.run.find(PHONE_FIX)
-        else:
-            search.run.tell(found=None)
-        search.run.be(state, why="because")
-        watch.shows(state)
-        assert watch.violations() == [], state
-        assert watch.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), state
-    watch.close()
+def test_no_number_on_the_page_says_more_than_is_known(watch: Watch, search: Served) -> None:
+    said = watch.page.evaluate(
+        """async () => {
+          const { percent, certainty, heatTicks } = await import("/page/cells.js");
+          return [[0, 1e-9, 0.00096, 0.096, 0.0996, 0.42, 0.996].map(percent), [0.994, 0.9994, 0.9997].map(certainty),
+            heatTicks({ top: 5e-6, decades: 3 })];
+        }"""
+    )
+    parts = ["0 %", "under 0.001 %", "0.1 %", "10 %", "10 %", "42 %", "over 99 %"]
+    assert said == [
+        parts,
+        ["99 %", "99.9 %", "over 99.9 %"],
+        ["0.0000005 %", "0.000005 %", "0.00005 %", "0.0005 %"],
+    ]
+    search.run.tell(pos=0.9997)
+    expect(watch.page.locator("#pos")).to_have_text("over 99.9 %")
 
 
 def coordinates_of(watch: Watch) -> Locator:
@@ -323,6 +317,18 @@ def test_the_map_has_two_views_names_from_the_file_and_north(watch: Watch) -> No
     expect(page.locator(".roi.likely")).to_have_count(4)
     expect(page.locator(".roi.exclude")).to_have_text("mast")
     expect(page.get_by_role("img", name="North is up")).to_be_visible()
+
+
+def test_after_a_find_the_rest_of_the_ground_can_still_be_told_apart(watch: Watch, search: Served) -> None:
+    before = watch.painted("Heat layer")
+    run = search.run.search
+    row, col = run.place.cell
+    for _ in range(3):
+        run.belief.observe([(row, col)], [True], 0.99, 0.99)
+    assert run.belief.probability().max() > 0.999
+    expect(watch.page.locator("#ticks-belief")).to_contain_text("100 % a cell")
+    assert watch.painted("Heat layer") == before
+    expect(watch.page.locator("#ticks-belief")).to_contain_text("≤ 0.0")
 
 
 LISTEN = """() => {

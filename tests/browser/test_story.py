@@ -150,6 +150,7 @@ def test_a_whole_story(way: type[Keyboard], chromium: Browser, drawn: Drawn) -> 
     watch.context.add_init_script(SHARING)  # for the page that comes when the search starts
     draw_a_search(hand, drawn)
     watch.shows("SEARCHING")
+    watch.says_it_in_words()
     hand.press(watch.order("Hold"))  # a look at the picture may take its time
     watch.shows("HOLDING")
     drawn.sees(-1)
@@ -162,8 +163,11 @@ def test_a_whole_story(way: type[Keyboard], chromium: Browser, drawn: Drawn) -> 
     lat, lon = drawn.sees(1)
     expect(cards(hand)).to_have_count(1, timeout=PATIENCE_MS)
     assert watch.violations() == []
+    watch.says_it_in_words()
     judge(hand, cards(hand), "Confirm")
     watch.shows("FOUND", "RETURNING", "DONE")
+    expect(page.locator("#why")).not_to_be_empty()
+    watch.says_it_in_words()
     hand_over(hand, f"{lat:.6f}, {lon:.6f}")
     assert drawn.ended() == 0
     ended = "The search is over and the service has ended"

@@ -28,7 +28,7 @@ from service.story import FlightSoFar, StoriesSoFar, story
 
 FRAME = GridFrame(47.0, 11.0, 0.0, 20.0, 10, 10, -100.0, 100.0)
 UP = TransitionRow(State.READY, Event.AIRBORNE, State.SEARCHING, "in the air")
-HOME = TransitionRow(State.SEARCHING, Event.SEARCHED, State.RETURNING, "searched to POS 97.0%")
+HOME = TransitionRow(State.SEARCHING, Event.SEARCHED, State.RETURNING, "searched to POS 97.0 %")
 DOWN = TransitionRow(State.RETURNING, Event.LANDED, State.DONE, "landed")
 AGAIN = ResumedRow("1", {})
 
@@ -137,7 +137,7 @@ ORDERED = TransitionRow(State.SEARCHING, Event.RETURN, State.RETURNING, "the ope
 @pytest.mark.parametrize(
     ("rows", "searched", "why"),
     [
-        ([UP, HOME, DOWN], True, "searched to POS 97.0%"),
+        ([UP, HOME, DOWN], True, "searched to POS 97.0 %"),
         ([UP, OrderRow("return", "SEARCHING"), ORDERED, DOWN], False, "the operator asked to return"),
         ([UP, HOME, TransitionRow(State.RETURNING, Event.REJECTED, State.SEARCHING, "")], False, None),
     ],

@@ -398,7 +398,7 @@ REFUSED: dict[str, tuple[Any, tuple[str, ...]]] = {
     ),
     "reaching too far": (
         polygon(ring([(-50_000, 0), (50_000, 0), (50_000, 200), (-50_000, 200)])),
-        ("field.geojson: the area reaches 50 km from its centre, more than 40 km", "several searches"),
+        ("field.geojson: the area reaches 50.0 km from its centre, more than 40 km", "several searches"),
     ),
 }
 

@@ -206,7 +206,7 @@ def test_no_gap_is_never_said_beside_ground_that_was_not_searched(run: Run) -> N
     text = FORMATS["html"].write(run, Wishes(poa_above=1000.0)).decode("utf-8")
     assert "There is no gap left" not in text
     assert re.search(
-        r"\d+% of the ground was not searched at all; \d+\.\d% of the probability lies there", text
+        r"\d+ % of the ground was not searched at all; \d+\.\d % of the probability lies there", text
     )
     whole = replace(run, pod=np.full_like(run.pod, 0.9))
     assert "There is no gap left" in FORMATS["html"].write(whole, Wishes(poa_above=1000.0)).decode("utf-8")

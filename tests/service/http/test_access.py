@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from service.errors import BadInput
-from service.http import Access, open_door, read_access, url_of
+from service.http import Access, Door, open_door, read_access, url_of
 
 from .door import (
     COMMAND,
@@ -62,6 +62,14 @@ def test_the_service_itself_reaches_a_door_on_every_address_by_loopback() -> Non
         "http://[::1]:8080",
         "http://127.0.0.9:8080",
         "http://[fe80::1]:8080",
+    ]
+
+
+def test_a_door_on_every_address_says_so_and_any_other_only_its_own() -> None:
+    said = [Door(settings(), Unbound(host), ALL).address for host in ("0.0.0.0", "127.0.0.9")]  # type: ignore[arg-type]
+    assert said == [
+        "http://127.0.0.1:8080 and at every other address of this machine (0.0.0.0)",
+        "http://127.0.0.9:8080",
     ]
 
 

@@ -374,3 +374,16 @@ def test_an_answer_does_not_wait_for_the_one_before_to_be_acknowledged() -> None
             writer.close()
 
     asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("nonsense", [b"\x16\x03\x01\x00\xa5\x01\r\n\r\n", b"\r\n" * 9])
+def test_what_a_stranger_does_wrong_is_not_in_the_terminal(
+    nonsense: bytes, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    async def knock() -> None:
+        async with on_a_socket(FakeRun()) as door:
+            await say(door, nonsense, patience_s=1.0)
+
+    asyncio.run(knock())
+    assert tuple(capfd.readouterr()) == ("", "")
+    assert caplog.records == []

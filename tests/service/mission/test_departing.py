@@ -121,7 +121,7 @@ def test_without_leave_to_take_off_it_waits_for_somebody_who_does() -> None:
     assert talk.state == State.SEARCHING
 
 
-LAST = Standing(state=State.RETURNING, why_stopped="searched to POS 97.0%", searched=True)
+LAST = Standing(state=State.RETURNING, why_stopped="searched to POS 97.0 %", searched=True)
 
 
 def test_a_run_that_was_on_its_way_home_does_not_take_off_again() -> None:
@@ -133,7 +133,7 @@ def test_a_run_that_was_on_its_way_home_does_not_take_off_again() -> None:
     talk.tick()
     assert talk.state == State.RETURNING
     assert not [effect for effect in talk.wanted if effect in STEPS[1:]]
-    assert (talk.core.standing.why_stopped, talk.core.standing.searched) == ("searched to POS 97.0%", True)
+    assert (talk.core.standing.why_stopped, talk.core.standing.searched) == ("searched to POS 97.0 %", True)
 
 
 @pytest.mark.parametrize("ours", [True, False])

@@ -7,8 +7,9 @@ from typing import get_args
 
 import pytest
 
+from service.chances import sure
 from service.mavlink.texts import text_messages
-from service.mission.effects import EnterGuided, Stop, Tell, WriteRow
+from service.mission.effects import Answer, EnterGuided, Stop, Tell, WriteRow
 from service.mission.news import Judged, Order
 from service.mission.states import State
 from service.places import Coordinates, written
@@ -48,7 +49,8 @@ def test_where_it_was_found_is_as_the_team_writes_places_and_fits_into_one_statu
     assert told.startswith(f"search FOUND: {place} p=")
     (message,) = text_messages(told, 2, 1)
     assert "?" not in message.text
-    assert talk.core.standing.why.startswith(f"found at {place}, p = ")
+    how_sure = f"{sure(FOUND.probability)} sure"
+    assert talk.core.standing.why == f"found at {place}, {how_sure}: sure enough to end the search"
 
 
 def test_hovering_over_what_was_found_ends_with_the_energy_for_the_way_home() -> None:
@@ -74,8 +76,21 @@ def test_a_confirmed_place_ends_the_search_whatever_its_probability() -> None:
     talk.sees(confirmed=True, found=place)
     talk.on(Judged(True, place))
     assert (talk.state, talk.core.standing.found) == (State.FOUND, place)
+    assert talk.core.standing.why.endswith(f"{place.lon:.6f}: the operator confirmed the place")
+    told = [each.text for each in talk.wanted if isinstance(each, Tell) and "FOUND" in each.text]
+    assert told == [f"search FOUND: {place.lat:.6f}, {place.lon:.6f}"]
     talk.tick()
     assert talk.state == State.RETURNING
+
+
+@pytest.mark.parametrize("state", list(State))
+def test_a_persons_word_on_a_place_is_taken_in_every_state(state: State) -> None:
+    talk = reached(state)
+    talk.sees(confirmed=True, found=FOUND)
+    assert Answer(7) in talk.on(Judged(True, FOUND, ticket=7))
+    assert talk.core.standing.found == FOUND
+    talk = reached(state)
+    assert Answer(8) in talk.on(Judged(False, None, ticket=8))
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from service.mission.news import Hit
 from service.mission.searching import Levelling
 from service.mission.states import State
 from service.motion import MotionLimits
+from service.rows import TransitionRow
 from tests.service.mission.flown import GRID, HERE, Talk, place, reached, searching, telemetry
 
 
@@ -173,7 +174,8 @@ def test_a_waypoint_that_may_have_been_lost_is_decided_anew_after_a_moment() -> 
 
 
 @pytest.mark.parametrize(
-    ("searched", "steps", "why"), [(1.0, 0, "searched to POS 100.0%"), (0.1, 40_000, "40000 steps flown")]
+    ("searched", "steps", "why"),
+    [(1.0, 0, "searched to POS over 99.9 %"), (0.1, 40_000, "40000 steps flown")],
 )
 def test_a_search_ends_when_there_is_nothing_more_to_gain(searched: float, steps: int, why: str) -> None:
     talk = searching()
@@ -190,6 +192,19 @@ def test_a_place_that_stands_out_is_confirmed_or_cleared() -> None:
         talk.sees(place_probability=probability)
         talk.tick()
         assert talk.state == state
+    assert [row.reason for row in talk.rows if isinstance(row, TransitionRow)][-2:] == [
+        "something at a place that is 60 % probable",
+        "the place is no longer likely, 30 %",
+    ]
+
+
+def test_a_place_that_wavers_is_told_of_once() -> None:
+    talk = searching()
+    for probability in (0.67, 0.45, 0.67, 0.4, 0.6, 0.36, 0.67):
+        talk.sees(place_probability=probability)
+        talk.tick()
+    told = [row.after for row in talk.rows if isinstance(row, TransitionRow)]
+    assert told.count(State.CONFIRMING) == 1
 
 
 def test_an_aircraft_taken_over_low_climbs_straight_up_first() -> None:

@@ -48,9 +48,16 @@ def test_what_happens_next_is_a_place_a_distance_and_a_chance() -> None:
         "distance_m": 396.0,
         "probability": 0.2,
     }
-    assert next_state(State.CONFIRMING, options, NAMES, REGIONS)["words"].startswith("Next: another look at")
+    again = next_state(State.CONFIRMING, options, NAMES, REGIONS, "47.000000, 8.000000, 55 %")
+    assert again["words"] == "Next: another look at 47.000000, 8.000000, 55 %"
     assert next_state(State.SEARCHING, [], NAMES, REGIONS)["words"] == "Next: the ground ahead"
     assert next_state(State.HOLDING, options, NAMES, REGIONS)["name"] is None
+
+
+@pytest.mark.parametrize(("chance", "words"), [(0.9993, "over 99 %"), (0.0004, "under 1 %"), (0.0, "0 %")])
+def test_a_chance_is_never_said_to_be_more_or_less_than_it_is(chance: float, words: str) -> None:
+    told = next_state(State.SEARCHING, [option(1, chosen=True)], NAMES, (chance, 0.0))
+    assert told["words"] == f"Next: shieling ruin, 400 m, {words}"
 
 
 def test_choices_are_places_each_once_the_chosen_one_first() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -161,4 +162,5 @@ def test_an_interrupt_writes_what_there_is_and_says_how_to_go_on(tmp_path):
     said, _ = process.communicate(timeout=120)
     assert process.returncode == 130
     assert "continues" in said
+    assert re.search(r"\d+ of \d{3,} jobs done in \d+ s", said)
     assert "Not complete" in (tmp_path / "report.md").read_text()

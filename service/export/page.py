@@ -178,7 +178,7 @@ def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
         total = sum(gap.poa for gap in gaps)
         yield (
             f"<p>A gap is ground with {level}. {_together(len(gaps))} {sure(total)} of the "
-            " probability. Exported as GeoJSON or KML they are polygons, as a plan a mission.</p>"
+            "probability. Exported as GeoJSON or KML they are polygons, as a plan a mission.</p>"
         )
     yield _picture(draw_gaps(run, gaps, wishes), "A map of the gaps, numbered as in the table")
     if gaps:

@@ -7,9 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from roisearch import Fleet
-from roisearch.place import Place, most_likely_place
+from roisearch.place import Place, most_likely_place, place_at
 from service.area import Grid
 from service.drawing import Drawing
+from service.evidence.found import Found
+from service.evidence.suspects import found_at
 from service.known import Known, Said, Withdrawn
 from service.news.bearing import FieldNews
 from service.redrawing import Redrawing, Sketch
@@ -40,6 +42,9 @@ class Common:
     new_drawing: list[Callable[[Sketch], None]] = field(default_factory=list)
     """Called when other regions are drawn."""
     _place: Place | None = None
+    _doubt: str | None = None
+    _best: Found | None = None
+    _confirmed: Found | None = None
 
     def __post_init__(self) -> None:
         self.grid = self.drawn
@@ -51,16 +56,45 @@ class Common:
             self._place = most_likely_place(self.known.belief.probability())
         return self._place
 
+    @property
+    def doubt(self) -> str:
+        """Why a find at the most likely place is not to be trusted without a person; empty when it may be."""
+        if self._doubt is None:
+            self._doubt = self.known.alarms.why_not(self.place.cell)
+        return self._doubt
+
+    @property
+    def best(self) -> Found:
+        """The most likely place as it is told, with its probability and ellipse."""
+        if self._best is None:
+            self._best = self._told(self.place)
+        return self._best
+
+    @property
+    def confirmed(self) -> Found | None:
+        """The place that an operator said is the target's, in the same way."""
+        if self._confirmed is None and self.known.confirmed is not None:
+            self._confirmed = self._told(place_at(self.known.belief.probability(), self.known.confirmed))
+        return self._confirmed
+
+    def _told(self, place: Place) -> Found:
+        return found_at(self.grid.frame, place, self.known.sightings.at(place.cell))
+
+    def _forget(self) -> None:
+        """Something else is known: what was worked out of it, which takes a look at every cell, is not so any more."""
+        self._place = self._doubt = self._best = self._confirmed = None
+
     def take(self, said: Said, time: float | None) -> None:
         """Believe what was seen, judged or told, exactly, at its time; see `Known.take`."""
         self.known.take(said, time)
-        self._place = None
+        self._forget()
         if isinstance(said, (FieldNews, Withdrawn)):
             self.fly_on(self.ground_of(self.known))
 
     def go_back(self, known: Known, grid: Grid | None) -> None:
         """Take up another state of what is known, which is ours from now on, with the ground of it."""
-        self.known, self._place = known, None
+        self.known = known
+        self._forget()
         self.fly_on(grid or self.ground_of(known))
 
     def ground_of(self, known: Known) -> Grid:

@@ -64,6 +64,8 @@ class Known:
         self.since: float | None = None
         """Of the first word, as `time`: the prior is taken to be of then."""
         self._said: list[tuple[float, Said]] = []
+        self._field: list[FieldNews | Withdrawn] = []
+        """What of it is news from the field."""
         self._kept: list[
             tuple[Known, int]
         ] = []  # earlier states, the oldest first, and how much was said by then
@@ -92,8 +94,8 @@ class Known:
     @property
     def news(self) -> list[FieldNews]:
         """The news that stand, in the order in which they came."""
-        back = {said.id for _, said in self._said if isinstance(said, Withdrawn)}
-        return [said for _, said in self._said if isinstance(said, FieldNews) and said.id not in back]
+        back = {said.id for said in self._field if isinstance(said, Withdrawn)}
+        return [said for said in self._field if isinstance(said, FieldNews) and said.id not in back]
 
     @property
     def excluded(self) -> list[FieldNews]:
@@ -103,11 +105,11 @@ class Known:
     @property
     def heard(self) -> int:
         """How many pieces of news there have been, those that were taken back among them."""
-        return sum(isinstance(said, FieldNews) for _, said in self._said)
+        return sum(isinstance(said, FieldNews) for said in self._field)
 
     def heard_as(self, name: str) -> FieldNews | None:
         """The news of this id, taken back or not; None when there has been none."""
-        each = (said for _, said in self._said if isinstance(said, FieldNews) and said.id == name)
+        each = (said for said in self._field if isinstance(said, FieldNews) and said.id == name)
         return next(each, None)
 
     def take(self, said: Said, time: float | None = None) -> None:
@@ -115,6 +117,7 @@ class Known:
         moment = time if time is not None else self.time or 0.0
         self._said.append((moment, said))
         if isinstance(said, (FieldNews, Withdrawn)):
+            self._field.append(said)
             self._kept = []
             self._begin()
             self._believe_all(self._said)
@@ -202,7 +205,7 @@ class Known:
     def copy(self) -> Known:
         """An independent copy; what was said is shared, since it never changes."""
         twin = copy.copy(self)
-        twin._said, twin._kept = list(self._said), list(self._kept)
+        twin._said, twin._field, twin._kept = list(self._said), list(self._field), list(self._kept)
         twin.belief = self.belief.copy()
         twin.record, twin.sightings, twin.alarms = copy.deepcopy((self.record, self.sightings, self.alarms))
         return twin

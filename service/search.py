@@ -20,7 +20,7 @@ from roisearch import Belief, Decision, Motion, Regions, SearchState, make_plann
 from roisearch.detection import DetectionRecord
 from roisearch.motion import TURNS
 from roisearch.motion_fit import Flown, learnt
-from roisearch.place import Place, place_at
+from roisearch.place import Place
 from roisearch.planners.base import InSeconds, Planner
 from roisearch.planners.ending import EndingPlanner
 from roisearch.planners.ending.settings import EndingSettings
@@ -34,7 +34,7 @@ from service.evidence.cover import covered_p_tp
 from service.evidence.found import Found
 from service.evidence.plausible import ground_metres
 from service.evidence.sensors import field_of_view
-from service.evidence.suspects import Sightings, found_at
+from service.evidence.suspects import Sightings
 from service.explain import explain
 from service.geometry import Cell
 from service.ground.flown import flown_heights
@@ -351,12 +351,9 @@ class Search:
 
     def found(self) -> Found | None:
         """Where the target is, when an operator has confirmed it or the posterior passes `search.found_at`."""
-        place = self.place
         if self.confirmed is not None:
-            place = place_at(self.belief.probability(), self.confirmed)
-        elif self.doubt() or not self._found_by_itself():
-            return None
-        return found_at(self.grid.frame, place, self.sightings.at(place.cell))
+            return self.common.confirmed
+        return self.common.best if self._found_by_itself() and not self.common.doubt else None
 
     def over(self) -> str:
         """Why the search is over, whoever flies it; empty while it is not."""
@@ -370,7 +367,7 @@ class Search:
 
     def best(self) -> Found:
         """The most likely place as it is told, with its probability and ellipse, however small that probability is."""
-        return found_at(self.grid.frame, self.place, self.sightings.at(self.place.cell))
+        return self.common.best
 
     def probable(self) -> Found | None:
         """The most likely place, when something was seen there and the target is there rather than not."""
@@ -381,7 +378,7 @@ class Search:
         """Why the most likely place waits for a person before it counts as found, for people; empty if it does not."""
         if self.confirmed is not None or not self._found_by_itself():
             return ""
-        return self.known.alarms.why_not(self.place.cell)
+        return self.common.doubt
 
     def _found_by_itself(self) -> bool:
         return self.place.probability >= self.settings.search.found_at and self.was_hit(self.place)

@@ -14,6 +14,9 @@ from roisearch.motion_fit import Flown
 from roisearch.planners.lookahead.planner import LookaheadPlanner
 from roisearch.planners.tour.planner import TourPlanner
 from service.config import MOCK_SPEEDUP, PlannerName, Settings
+from service.evidence.observe import Observation
+from service.geometry import Cell
+from service.known import Judgement
 from service.mission.energy import Left
 from service.motion import MotionLimits
 from service.search import GETS_READY_S, Search
@@ -136,3 +139,34 @@ def test_a_plan_for_the_next_flight_is_as_good_as_a_first_one() -> None:
     first.warm_up()
     fresh = first.planner.plan(first.belief, SearchState(GRID.start), rng)
     assert decision.value == pytest.approx(fresh.value, rel=0.05)
+
+
+def test_what_is_told_of_a_find_is_worked_out_once_for_each_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It goes through every cell that was looked at, and the mission asks ten times a second, on the way home too."""
+    asked: list[Cell] = []
+    it, cells = search(), np.argwhere(GRID.searchable)
+    hit = Observation(cells[5:6], *(np.array([value]) for value in (True, 0.99, 0.999, True)))
+    why_not = it.known.alarms.why_not
+    monkeypatch.setattr(it.known.alarms, "why_not", lambda place: asked.append(place) or why_not(place))
+    for _ in range(4):
+        it.take(hit)
+    first = it.found()
+    assert first is not None
+    assert all(it.found() is first for _ in range(20))
+    assert len(asked) == 1
+    it.take(hit)
+    second = it.found()
+    assert second is not None
+    assert second.probability > first.probability
+    assert len(asked) == 2
+    other = (int(cells[40, 0]), int(cells[40, 1]))
+    it.take(
+        Judgement(other, Observation(cells[40:41], hit.hits, hit.p_tp, hit.p_tn, hit.first), confirmed=True)
+    )
+    confirmed = it.found()
+    assert confirmed is not None
+    assert (confirmed.lat, confirmed.lon) != (second.lat, second.lon)
+    it.take(hit)
+    again = it.found()
+    assert again is not None
+    assert again.probability < confirmed.probability

@@ -10,8 +10,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from roisearch.planners.outside import is_outside
+from roisearch.registry import PLANNERS
 from service.area import read_area
 from service.errors import BadInput
+from sim.autopilot.core import FIRMWARES
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -19,6 +22,21 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound="DataclassInstance")
 RESULT = "result.json"
 GOES_ON = "With --out, the same command goes on where it was interrupted."
+
+
+def _flavors(text: str) -> str:
+    for name in text.split(","):
+        if name not in FIRMWARES:
+            raise argparse.ArgumentTypeError(f"there is no flavor '{name}'; there is {', '.join(FIRMWARES)}")
+    return text
+
+
+def planners(text: str) -> str:
+    """Names of planners, separated by commas, for argparse."""
+    for name in text.split(","):
+        if name not in PLANNERS and not is_outside(name):
+            raise argparse.ArgumentTypeError(f"there is no planner '{name}'; there is {', '.join(PLANNERS)}")
+    return text
 
 
 def check_areas(parser: argparse.ArgumentParser, areas: Sequence[Path]) -> None:
@@ -43,7 +61,9 @@ def add_options(parser: argparse.ArgumentParser, each: str, *, speedup: float, p
 
 def add_flavors(parser: argparse.ArgumentParser, *, jobs: int) -> None:
     """Which mock autopilots fly, and how many flights at a time."""
-    parser.add_argument("--flavors", default="px4,ardupilot", help="mock autopilots, separated by commas")
+    parser.add_argument(
+        "--flavors", type=_flavors, default="px4,ardupilot", help="mock autopilots, separated by commas"
+    )
     parser.add_argument("--jobs", type=int, default=jobs, help="flights at a time; each keeps a core busy")
 
 

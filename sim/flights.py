@@ -34,7 +34,7 @@ from rich.table import Table
 
 from service.errors import Parser
 from sim import flights_together, overground, sorties_campaign
-from sim.flight_campaign import add_flavors, add_options, check_areas, seeds_of
+from sim.flight_campaign import add_flavors, add_options, check_areas, planners, seeds_of
 from sim.flight_times import GOALS, Times, times_of
 from sim.progress import Rest, bars
 
@@ -187,7 +187,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--within", type=float, default=1.5, metavar="CELLS", help="largest error of a good flight"
     )
-    parser.add_argument("--planners", default="puct-regions-lite", help="planners, separated by commas")
+    parser.add_argument(
+        "--planners", type=planners, default="puct-regions-lite", help="planners, separated by commas"
+    )
     parser.add_argument(
         "--no-target", action="store_true", help="nothing to find: times to POS 50, 75 and 90 %%"
     )

@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--sensor", metavar="ID", help="of which camera (all: one pipeline watches one)")
     parser.add_argument(
-        "--latency", metavar="S", type=float, default=0.2, help="from lens to message (%(default)s)"
+        "--latency", metavar="S", type=flags.seconds, default=0.2, help="from lens to message (%(default)s)"
     )
     options = parser.parse_args(arguments)
     if options.mqtt is not None:

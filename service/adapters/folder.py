@@ -36,7 +36,7 @@ def main(arguments: list[str]) -> int:
     add_model(parser)
     parser.add_argument("--folder", metavar="DIR", type=Path, required=True, help="where pictures appear")
     parser.add_argument(
-        "--latency", metavar="S", type=float, default=0.0, help="from lens to file (%(default)s)"
+        "--latency", metavar="S", type=flags.seconds, default=0.0, help="from lens to file (%(default)s)"
     )
     parser.add_argument(
         "--idle", metavar="S", type=float, help="end when nothing has come for so long (never)"

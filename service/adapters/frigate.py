@@ -43,7 +43,7 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--stats-age", metavar="S", type=float, default=90.0, help="(%(default)s)")
     parser.add_argument(
-        "--latency", metavar="S", type=float, default=0.5, help="of empty frames (%(default)s)"
+        "--latency", metavar="S", type=flags.seconds, default=0.5, help="of empty frames (%(default)s)"
     )
     options = parser.parse_args(arguments)
     broker = read_broker(options.mqtt, options.mqtt_credentials)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 from pathlib import Path
 
@@ -28,7 +29,11 @@ def parser(kind: str, words: str | None) -> argparse.ArgumentParser:
     )
     made.add_argument("--source", metavar="NAME", default=kind, help="how the camera is called (%(default)s)")
     made.add_argument(
-        "--patience", metavar="S", type=float, default=30.0, help="give up on a silent service (%(default)s)"
+        "--patience",
+        metavar="S",
+        type=seconds,
+        default=30.0,
+        help="give up on a silent service (%(default)s)",
     )
     return made
 
@@ -38,6 +43,22 @@ def share(text: str) -> float:
     value = float(text)
     if not 0.0 <= value <= 1.0:
         raise argparse.ArgumentTypeError(f"'{text}' is not between 0 and 1")
+    return value
+
+
+def seconds(text: str) -> float:
+    """Seconds, none of them negative, for argparse."""
+    value = float(text)
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is no time; give seconds, 0 or more")
+    return value
+
+
+def hertz(text: str) -> float:
+    """How often a second, for argparse."""
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not how often a second; give more than 0")
     return value
 
 

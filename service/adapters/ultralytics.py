@@ -29,10 +29,10 @@ def main(arguments: list[str]) -> int:
         "--threshold", type=flags.share, default=0.4, help="report scores from here on (%(default)s)"
     )
     parser.add_argument(
-        "--latency", metavar="S", type=float, default=0.0, help="from the lens to here (%(default)s)"
+        "--latency", metavar="S", type=flags.seconds, default=0.0, help="from the lens to here (%(default)s)"
     )
     parser.add_argument(
-        "--rate", metavar="HZ", type=float, default=5.0, help="frames a second at most (%(default)s)"
+        "--rate", metavar="HZ", type=flags.hertz, default=5.0, help="frames a second at most (%(default)s)"
     )
     parser.add_argument("--frames", metavar="N", type=int, help="end after so many")
     options = parser.parse_args(arguments)

@@ -76,6 +76,15 @@ def read_settings(
     return changed_settings(values, flags or {}, where)
 
 
+FLAGS = {
+    "sensor.cell_m": "--cell",
+    "http.listen": "--http",
+    "run.folder": "--runs",
+    "ground.file": "--ground",
+}
+"""The flags that are not called as the key of the setting that they change."""
+
+
 def changed_settings(values: dict[str, Any], changed: Mapping[str, Any], where: str) -> Settings:
     """Settings from `values` (tables by section, named `where`) with some 'section.key' changed; None: not.
 
@@ -89,7 +98,7 @@ def changed_settings(values: dict[str, Any], changed: Mapping[str, Any], where: 
         elif value is not None:
             section, key = dotted.split(".")
             values.setdefault(section, {})[key] = value
-            checked(values, f"--{key.replace('_', '-')}")
+            checked(values, FLAGS.get(dotted, f"--{key}"))
     settings = checked(values, where)
     for name, alone in each_aircraft(settings).items():
         _check_flight(alone, f"{where}: aircraft '{name}'" if name else where)

@@ -97,6 +97,7 @@ def _gaps(run: Run, wishes: Wishes) -> Iterable[Item]:
             "area_m2": round(gap.area_m2, 1),
             "cells": gap.cells,
             "flyable": gap.flyable,
+            "place": run.written(*gap.middle),
         }
         yield Item("gap", f"gap {number}", gap.polygon, facts=facts)
 
@@ -108,6 +109,7 @@ def _detections(run: Run) -> Iterable[Item]:
             "score": each.score,
             "source": each.source,
             "counted": each.counted,
+            "place": run.written(each.lat, each.lon),
         }
         yield Item(
             "detection", f"detection {number}", _point(each.lat, each.lon), time=each.time, facts=facts
@@ -120,14 +122,18 @@ def _found(run: Run) -> Iterable[Item]:
     if find is None:
         return
     major, minor, bearing = find.ellipse
-    facts = {
+    spread = {
         "semi_major_m": round(major, 1),
         "semi_minor_m": round(minor, 1),
         "bearing_deg": round(bearing, 1),
     }
     name = "where the target is with 95 %"
-    yield Item("uncertainty", name, on_earth(run.frame, _ellipse(run, find)), facts={"holds": 0.95, **facts})
-    facts = {"probability": find.probability, "sigma_m": find.sigma_m}
+    yield Item("uncertainty", name, on_earth(run.frame, _ellipse(run, find)), facts={"holds": 0.95, **spread})
+    facts = {
+        "probability": find.probability,
+        "sigma_m": find.sigma_m,
+        "place": run.written(find.lat, find.lon),
+    }
     yield Item("found", "found", _point(find.lat, find.lon), time=find.time, facts=facts)
 
 

@@ -58,7 +58,10 @@ def _marks(run: Run, wishes: Wishes) -> Iterator[tuple[float, float, str, str, s
 
 
 def _note(item: Item) -> str:
-    return ", ".join(f"{name} {value:.4g}" for name, value in item.facts.items()) or item.name
+    said = [
+        f"{name} {value if isinstance(value, str) else f'{value:.4g}'}" for name, value in item.facts.items()
+    ]
+    return ", ".join(said) or item.name
 
 
 def _tag(name: str) -> str:

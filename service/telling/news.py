@@ -74,6 +74,7 @@ class Newsdesk:
         self._run = run
         self._suspects: list[LatLon] = []
         self._found: LatLon | None = None
+        self._found_written = ""
 
     def news(self, state: RunState, time: float) -> list[News]:
         """What has to be told now; each thing once."""
@@ -90,10 +91,12 @@ class Newsdesk:
                         "found", state, time, place, found["written"], found["probability"], within, text
                     )
                 )
-                self._found = place
+                self._found, self._found_written = place, found["written"]
         elif self._found is not None:
-            text = "the find is taken back: the search goes on"
-            told.append(self._new("withdrawn", state, time, self._found, "", 0.0, None, text))
+            text = f"the find at {self._found_written} is taken back: the search goes on"
+            told.append(
+                self._new("withdrawn", state, time, self._found, self._found_written, 0.0, None, text)
+            )
             self._found = None
         for each in state["suspects"]:
             place = (each["lat"], each["lon"])

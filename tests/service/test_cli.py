@@ -127,6 +127,14 @@ def test_a_link_that_may_be_a_real_aircraft_is_warned_of_until_somebody_has_thou
         (simulate, "flights nowhere.geojson", "nowhere.geojson: there is no such file; check the path;"),
         (simulate, "flights --aircraft 2 nowhere.geojson", "nowhere.geojson: there is no such file;"),
         (simulate, "detector --service foo", "'foo' is no address; give http://HOST:PORT"),
+        (simulate, "flights a.geojson --flavors px5", "no flavor 'px5'; there is px4, ardupilot"),
+        (simulate, "flights a.geojson --planners nope", "no planner 'nope'; there is puct,"),
+        (main, "detector onnx --model m --video 0 --latency -5", "'-5' is no time; give seconds, 0 or more"),
+        (
+            main,
+            "detector onnx --model m --video 0 --rate 0",
+            "'0' is not how often a second; give more than 0",
+        ),
         (simulate, "trials --trials many", "argument --trials: invalid int value: 'many'"),
     ],
 )

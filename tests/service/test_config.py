@@ -62,6 +62,11 @@ def test_a_wrong_setting_is_named_with_what_is_allowed(tmp_path: Path, text: str
         assert word in str(caught.value)
 
 
+def test_a_wrong_flag_is_called_as_it_was_typed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert service_main(["--area", "config/area.geojson", "--cell", "-5"]) == 2
+    assert "--cell: 'sensor.cell_m' = -5.0 is not possible" in capsys.readouterr().err
+
+
 def test_a_missing_file_and_a_wrong_variable_are_named(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"none\.toml: cannot be read"):
         read_settings(tmp_path / "none.toml", environment={})

@@ -21,6 +21,17 @@ KML = (
 )
 
 
+MINE = """
+from roisearch import BasePlanner
+
+
+class Nearest(BasePlanner):
+    def choose(self, belief, state, rng):
+        return [self.moves(belief, state)[0][1]]
+"""
+"""A planner from outside."""
+
+
 def example() -> str:
     """The area file that the service's page shows."""
     page = (TOP / "service" / "README.md").read_text(encoding="utf-8")
@@ -44,6 +55,7 @@ def lay_out(folder: Path) -> Path:
     (folder / "scored.csv").write_text("score,there\n0.9,1\n0.8,1\n,1\n0.3,0\n,0\n,0\n", encoding="utf-8")
     with zipfile.ZipFile(folder / "map.kmz", "w") as packed:
         packed.writestr("doc.kml", KML)
+    (folder / "mine.py").write_text(MINE, encoding="utf-8")
     write_model(folder / "best.onnx")
     interrupted(folder / "runs" / RUN)
     (folder / ".venv").symlink_to(sys.prefix)

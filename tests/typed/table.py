@@ -8,7 +8,7 @@ from __future__ import annotations
 LONG = "takes minutes to days: tests/sim runs each with less"
 OTHERS = "another program"
 INSTALLS = "installs: CI does it, in a new environment"
-SYSTEM = "changes the machine: tests/service/test_unit.py and test_dockerfile.py read these files"
+SYSTEM = "changes the machine: tests/service/test_systemd_unit.py and test_dockerfile.py read these files"
 CAMERA = "needs a camera: tests/integration/test_rtsp_flight.py flies with one, tests/service/adapters plays the others"
 SERIAL = "needs a serial port: tests/service/mavlink/test_transports.py plays one"
 AGAIN = "the first page's line with this link is run, and tests/integration takes off"

@@ -65,8 +65,8 @@ def test_a_red_square_in_a_stream_is_reported_and_so_is_that_it_is_gone(
 def test_a_file_is_played_as_though_it_were_live(tmp_path: Path) -> None:
     file = tmp_path / "flight.avi"
     writer = cv2.VideoWriter(str(file), cv2.VideoWriter.fourcc(*"MJPG"), 20.0, (128, 128))
-    for number in range(20):
-        writer.write(picture(red_at=RED if number >= 10 else None))
+    for number in range(80):  # four seconds, of which a busy machine sees some frames too
+        writer.write(picture(red_at=RED if number >= 20 else None))
     writer.release()
     with taking() as taker:
         flags = words(taker, write_model(tmp_path / "red.onnx"), "--video", str(file), "--rate", "100")

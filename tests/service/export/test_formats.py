@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import csv
+import dataclasses
 import io
 import itertools
 import json
@@ -37,6 +38,7 @@ from service.export.gaps import gap_cells
 from service.export.model import Run
 from service.export.run import read_run
 from service.export.wishes import Wishes
+from service.places import written
 from sim.autopilot.process import AutopilotProcess
 from tests.service.export.recorded import EVIL, record
 
@@ -137,6 +139,19 @@ def test_gpx_keeps_to_its_schema_and_is_read_by_gpxpy(found: Run, tmp_path: Path
         assert point.time.timestamp() == pytest.approx(fix.time, abs=1e-3)
     kinds = [mark.type for mark in read.waypoints]
     assert (kinds.count("launch"), kinds.count("hit"), kinds.count("found")) == (1, 1, 1)
+
+
+def test_descriptions_write_places_as_the_team_does(found: Run) -> None:
+    in_mgrs = found.settings.run.model_copy(update={"coordinates": "mgrs"})
+    run = dataclasses.replace(found, settings=found.settings.model_copy(update={"run": in_mgrs}))
+    assert run.find is not None
+    place = written((run.find.lat, run.find.lon), "mgrs")
+    features = json.loads(FORMATS["geojson"].write(run, WISHES))["features"]
+    told = {each["properties"]["role"]: each["properties"].get("place") for each in features}
+    assert told["found"] == place
+    assert re.fullmatch(r"\d\d[A-Z] [A-Z]{2} \d{5} \d{5}", told["gap"])
+    for name in ("kml", "gpx"):
+        assert place in FORMATS[name].write(run, WISHES).decode()
 
 
 def test_geotiff_is_placed_by_gdal_where_the_grid_is(run: Run, tmp_path: Path) -> None:

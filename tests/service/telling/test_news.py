@@ -25,7 +25,8 @@ def test_a_find_is_told_and_taken_back_and_found_again() -> None:
     assert "FOUND at 32T MT 46916 11171, probability over 99.9 %, 95 % within 7 m" in told.text
     assert watch.news(state(state="RETURNING", found=found()), 2.0) == []
     (back,) = watch.news(state(), 3.0)
-    assert back.kind == "withdrawn"
+    assert (back.kind, back.written) == ("withdrawn", "32T MT 46916 11171")
+    assert "the find at 32T MT 46916 11171 is taken back" in back.text
     assert [each.kind for each in watch.news(state(found=found()), 4.0)] == ["found"]
 
 

@@ -28,5 +28,6 @@ export function aimByKeys(map, onMove, onEscape) {
   // before the map library, whose arrow keys go further than a place wants
   container.addEventListener("keydown", key, { capture: true });
   container.addEventListener("focus", () => point("mousemove"));
+  map.on("resize", () => document.activeElement === container && point("mousemove"));
   map.on("unload", () => container.removeEventListener("keydown", key, { capture: true }));
 }

@@ -294,6 +294,15 @@ def test_the_map_is_measured_and_places_are_told_by_keys_alone(keys: Keyboard, s
     expect(page.locator(".measured")).to_have_count(0)
 
 
+def test_the_place_under_the_cross_hair_is_told_again_when_the_map_gets_another_size(keys: Keyboard) -> None:
+    page, told = keys.page, coordinates_of(keys.watch)
+    keys.reach(page.locator("#map"))
+    expect(told).to_have_text(re.compile(r"^56\.\d{6}, -4\.\d{6}$"))
+    before = told.inner_text()
+    page.locator("header").evaluate("(header) => (header.style.paddingBottom = '9rem')")
+    expect(told).not_to_have_text(before)
+
+
 def test_news_get_their_place_by_keys_alone(keys: Keyboard, search: Served) -> None:
     page, press = keys.page, keys.page.keyboard.press
     keys.press(page.get_by_text("Tell news"))
@@ -301,9 +310,9 @@ def test_news_get_their_place_by_keys_alone(keys: Keyboard, search: Served) -> N
     expect(page.locator("#map")).to_be_focused()
     expect(page.locator("#toast")).to_contain_text("Enter takes the place under the cross-hair")
     press("ArrowUp")
-    place = coordinates_of(keys.watch).inner_text()
     press("Enter")
     expect(page.locator("#news-metres")).to_be_focused()
+    place = coordinates_of(keys.watch).inner_text()
     assert f"{page.locator('#news-lat').input_value()}, {page.locator('#news-lon').input_value()}" == place
 
 

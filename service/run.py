@@ -81,7 +81,12 @@ def run(area_file: Path, prior_file: Path | None, settings: Settings, *, restart
             journal.set_meta("grid", prepared.grid.frame.to_dict())
             journal.set_meta("settings", settings.model_dump())
             note_beginning(journal, folder, settings)
-            return _fly(prepared, folder, journal)
+            try:
+                searches = _ready(prepared)
+            except BadInput:
+                shutil.rmtree(folder)  # a run that has not begun is none to go on with
+                raise
+            return _fly(prepared, searches, folder, journal)
 
 
 def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) -> int:
@@ -105,7 +110,7 @@ def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) ->
                 f"{folder}: its journal is of another grid than its area file makes; resume it unchanged"
             )
         note_resumption(journal, folder, settings)
-        return _fly(prepared, folder, journal)
+        return _fly(prepared, _ready(prepared), folder, journal)
 
 
 @contextlib.contextmanager
@@ -136,8 +141,8 @@ def _prepared(
         yield Prepared(area, grid, sensors, settings, restarted, door, doors, signing_key, console, telling)
 
 
-def _fly(prepared: Prepared, folder: Path, journal: Journal) -> int:
-    """Compile the planner and fly."""
+def _ready(prepared: Prepared) -> list[Search]:
+    """The searches, with what their planners need compiled. Raises BadInput when one from outside cannot plan."""
     searches = searches_of(prepared)
     search = searches[0]
     log.info("regions of interest: %d", search.regions.count)
@@ -145,8 +150,11 @@ def _fly(prepared: Prepared, folder: Path, journal: Journal) -> int:
     _compile(prepared.console, search)
     for each in searches[1:]:
         each.plan_anew()
-    service = Service(prepared, searches, folder)
-    return asyncio.run(service.fly(journal))
+    return searches
+
+
+def _fly(prepared: Prepared, searches: list[Search], folder: Path, journal: Journal) -> int:
+    return asyncio.run(Service(prepared, searches, folder).fly(journal))
 
 
 def searches_of(prepared: Prepared) -> list[Search]:

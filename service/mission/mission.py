@@ -372,9 +372,7 @@ class Mission:
         state = SearchState(wanted.cell, wanted.heading, wanted.speed_mps)
         try:
             decision = await self.search.decide(state, unseen, wanted.left, self.clock.now())
-        except (
-            Exception
-        ) as error:  # whatever a planner from outside does: the aircraft is not left alone for it
+        except Exception as error:  # whatever a planner from outside does: the aircraft is not left alone
             log.exception("the planner has failed")
             self._thinking = None
             self._feed(NotThought(f"{type(error).__name__}: {error}"))

@@ -164,6 +164,7 @@ def test_what_is_wrong_with_a_planner_from_outside_is_one_sentence_before_the_fl
     assert service_main(words) == 2
     *_, last = capsys.readouterr().err.strip().splitlines()
     assert last.removeprefix("roisearch-service: ").startswith(said)
+    assert not list(tmp_path.glob("*/journal*")), "a run that has not begun is none to go on with"
     assert service_main(["preview", "--area", str(area), "--planner", planner]) == 2
     assert said in capsys.readouterr().err
 

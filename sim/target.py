@@ -52,8 +52,10 @@ def draw_tour(
     """A random tour from `start` (row, col, with fractions) for so long: what `roisearch.walk` reckons as a diffusion.
 
     Straight legs at the speed of `walk`, with a new direction after times that are exponential, and wherever the next
-    stride would lead off `open_cells`, bool [rows, cols]; until it stops for good. Its mobility is not looked at.
+    stride would lead off `open_cells`, bool [rows, cols], or into a cell that it does not enter this time, as it does with
+    the chance of that cell's mobility; until it stops for good.
     """
+    mobility = None if walk.mobility is None else np.asarray(walk.mobility)
     stops_after = rng.exponential(3600.0 / walk.stops_per_hour) if walk.stops_per_hour > 0.0 else math.inf
     end, stride_s = min(seconds, stops_after), STRIDE * walk.cell_m / walk.speed_mps
     time, place = 0.0, np.array(start, dtype=np.float64)
@@ -65,13 +67,25 @@ def draw_tour(
         while time < turn:
             passed = min(stride_s, turn - time)
             there = place + direction * passed
-            if not _is_open(there, open_cells):
+            if not _is_open(there, open_cells) or not _enters(place, there, mobility, rng):
                 time += 1e-3 * stride_s  # turning on the spot; whoever is walled in comes to an end too
                 break
             time, place = time + passed, there
         times.append(time)
         places.append(place)
     return Tour(np.array(times), np.array(places))
+
+
+def _enters(
+    place: NDArray[np.float64],
+    there: NDArray[np.float64],
+    mobility: NDArray[np.float64] | None,
+    rng: np.random.Generator,
+) -> bool:
+    """Whether a stride from `place` is made: into another cell with the chance of its mobility."""
+    if mobility is None or np.array_equal(np.floor(place), np.floor(there)):
+        return True
+    return bool(rng.random() < mobility[math.floor(there[0]), math.floor(there[1])])
 
 
 def _is_open(place: NDArray[np.float64], open_cells: NDArray[np.bool_]) -> bool:

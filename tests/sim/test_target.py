@@ -61,3 +61,15 @@ def test_a_tour_stays_on_open_cells_and_ends_when_the_target_stops() -> None:
 def test_a_tour_is_between_its_places_in_between() -> None:
     tour = Tour(np.array([0.0, 10.0]), np.array([[0.0, 0.0], [1.0, 2.0]]))
     assert tour.at(5.0) == (0.5, 1.0)
+
+
+def test_a_target_keeps_to_ground_that_is_walked_as_the_belief_has_it() -> None:
+    """Where it has walked for long, it is in each cell as often as that is easily entered; not in water."""
+    mobility = np.array([[1.0, 0.25, 1.0], [0.5, 0.0, 0.5], [1.0, 0.25, 1.0]])
+    walk = Walk(speed_mps=1.0, cell_m=10.0, straight_s=10.0, mobility=mobility)
+    tour = draw_tour((0.5, 0.5), walk, np.ones((3, 3), dtype=bool), 150_000.0, np.random.default_rng(3))
+    places = np.floor([tour.at(second) for second in range(0, 150_000, 5)]).astype(int)
+    share = np.zeros((3, 3))
+    np.add.at(share, (places[:, 0], places[:, 1]), 1.0 / len(places))
+    assert share[1, 1] < 1e-3, "a stride may cut a corner"
+    assert share == pytest.approx(mobility / mobility.sum(), abs=0.04)

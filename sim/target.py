@@ -52,8 +52,8 @@ def draw_tour(
     """A random tour from `start` (row, col, with fractions) for so long: what `roisearch.walk` reckons as a diffusion.
 
     Straight legs at the speed of `walk`, with a new direction after times that are exponential, and wherever the next
-    stride would lead off `open_cells`, bool [rows, cols], or into a cell that it does not enter this time, as it does with
-    the chance of that cell's mobility; until it stops for good.
+    stride would lead off `open_cells`, bool [rows, cols], or into a cell that it does not enter this time, as it does
+    with the chance of that cell's mobility; until it stops for good.
     """
     mobility = None if walk.mobility is None else np.asarray(walk.mobility)
     stops_after = rng.exponential(3600.0 / walk.stops_per_hour) if walk.stops_per_hour > 0.0 else math.inf

@@ -24,7 +24,7 @@ SAME_HOME_M = 5.0
 `Energy.objection` has the last word."""
 
 
-class Ways(NamedTuple):
+class WaysHome(NamedTuple):
     """The ways from all cells to one home: `legs` (east, north) in metres [n, 2], each of the cell in `owners` [n], and
     the cells from which none leads around what is excluded. `upright_s` [cells] is what climb and descent take; none
     where the ground is taken as flat, for they are the same from everywhere."""
@@ -42,8 +42,8 @@ class Reach:
 
     def __init__(self, grid: Grid, flight: FlightSettings) -> None:
         self._grid, self._flight = grid, flight
-        self._ways: Ways | None = None
-        self._looking: Future[Ways] | None = None
+        self._ways: WaysHome | None = None
+        self._looking: Future[WaysHome] | None = None
 
     def knows(self, home: LatLon) -> bool:
         """Whether the ways to this home are known; if not, they are looked for in a thread from now on."""
@@ -57,7 +57,7 @@ class Reach:
             threading.Thread(target=self._look, args=work, name="ways home", daemon=True).start()
         return False
 
-    def _look(self, home: LatLon, looking: Future[Ways]) -> None:
+    def _look(self, home: LatLon, looking: Future[WaysHome]) -> None:
         try:
             looking.set_result(self._find_ways(home))
         except Exception as error:
@@ -86,7 +86,7 @@ class Reach:
         upright = ways.upright_s if ways.upright_s.size else left.upright_s
         return np.asarray((seconds + upright).reshape(rows, cols))
 
-    def _find_ways(self, home: LatLon) -> Ways:
+    def _find_ways(self, home: LatLon) -> WaysHome:
         """The legs of the way from each cell: straight, or around the exclusions."""
         frame = self._grid.frame
         cells = frame.to_latlon(np.argwhere(np.ones(frame.shape, dtype=bool)))
@@ -105,7 +105,7 @@ class Reach:
             owners.append(np.full(len(parts), cell))
             legs.append(np.array(parts).reshape(-1, 2))
         upright = self._upright_s(home, routes)
-        return Ways(
+        return WaysHome(
             home, np.concatenate(owners), np.concatenate(legs), np.array(none, dtype=np.int64), upright
         )
 

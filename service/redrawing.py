@@ -24,7 +24,7 @@ from service.drawing import Drawing, news_of
 log = logging.getLogger("roisearch")
 EVERY_S = 10.0
 """How often it is looked whether regions are to be drawn again, in the time of the search."""
-Names = Callable[[Regions], tuple[str, ...]]
+NamesOf = Callable[[Regions], tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Redrawing:
         named: what people call regions.
     """
 
-    def __init__(self, moved: float, searchable: NDArray[np.bool_], named: Names) -> None:
+    def __init__(self, moved: float, searchable: NDArray[np.bool_], named: NamesOf) -> None:
         self._moved, self._searchable, self._named = moved, searchable, named
         self._at: float | None = None
         self._drawing: Future[Sketch | None] | None = None

@@ -23,7 +23,7 @@ from service.evidence.found import IN_95_PERCENT, Found
 from service.evidence.observe import FramePose, Observation
 from service.geometry import Cell, LatLon
 from service.mission.states import Event, State
-from service.news.bearing import FieldNews, Role
+from service.news.bearing import FieldNews, NewsRole
 from service.reasons import Option
 from service.rowbody import Body
 from service.timebase import ROW as TIE
@@ -318,7 +318,7 @@ class NewsRow:
     def read(cls, body: Body, time: float) -> Self:
         role, place = body.text("role"), body.place_or_none("place")
         cells, values = body.cells("cells"), body.numbers("values")
-        if role not in get_args(Role) or place is None or len(cells) != len(values):
+        if role not in get_args(NewsRole) or place is None or len(cells) != len(values):
             raise ValueError(
                 f"news of the role {shown(role)} for {len(cells)} cells have {len(values)} values"
             )
@@ -326,7 +326,9 @@ class NewsRow:
         drawn = body.get("ground")
         ground = None if drawn is None else shape({"type": "MultiPolygon", "coordinates": drawn})
         worth = np.array(values, dtype=np.float64)
-        return cls(FieldNews(body.text("id"), cast(Role, role), body.text("words"), place, at, worth, ground))
+        return cls(
+            FieldNews(body.text("id"), cast(NewsRole, role), body.text("words"), place, at, worth, ground)
+        )
 
 
 @dataclass(frozen=True)

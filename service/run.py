@@ -41,7 +41,7 @@ from service.resume import Whose, interrupted_run, left_system_id, stored_settin
 from service.search import Search, begin
 from service.squad import Squad
 from service.survey import AREA, JOURNAL, PRIOR, keep_area, survey
-from service.telling import Plan, read_plan
+from service.telling import TellingPlan, read_plan
 from service.timebase import clock_for
 from service.view.live import RunView
 
@@ -67,7 +67,7 @@ class Prepared:
     doors: Doors
     signing_key: bytes | None
     console: Console
-    telling: Plan = NOBODY
+    telling: TellingPlan = NOBODY
 
 
 def run(area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool = False) -> int:

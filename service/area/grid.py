@@ -14,7 +14,7 @@ from service.area import route
 from service.area.checks import check_launch
 from service.area.frame import BoolArray, GridFrame, lay_frame
 from service.area.geojson import Where
-from service.area.model import SearchArea, Target
+from service.area.model import SearchArea, TargetMotion
 from service.area.prior import area_prior, cell_squares, covered_fraction
 from service.area.projection import FloatArray, surface_m2
 from service.area.route import KeepOut
@@ -80,7 +80,7 @@ class Grid:
     clearance_m: float = CLEARANCE_M
     relief: Relief | None = None
     visibility: FloatArray | None = None
-    target: Target | None = None
+    target: TargetMotion | None = None
     mobility: FloatArray | None = None
     coordinates: Coordinates = "degrees"
 

@@ -104,7 +104,7 @@ class Cover:
 
 
 @dataclass(frozen=True)
-class Target:
+class TargetMotion:
     """How the target moves, if it does: it walks at random (`roisearch.Walk`).
 
     `speed_mps` metres a second; `stops_per_hour` how often in an hour it stops for good; `straight_s` mean seconds
@@ -140,4 +140,4 @@ class SearchArea:
     notes: tuple[str, ...] = ()
     transit: shapely.MultiPolygon | None = None
     covers: tuple[Cover, ...] = ()
-    target: Target | None = None
+    target: TargetMotion | None = None

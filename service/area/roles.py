@@ -20,7 +20,7 @@ from service.area.model import (
     PolygonPrior,
     Prior,
     RingPrior,
-    Target,
+    TargetMotion,
 )
 from service.area.target import read_target
 from service.area.words import MOST_COLUMNS
@@ -50,7 +50,7 @@ class Parts:
     launch: LatLon | None = None
     launch_item: Item | None = None
     outside: float | None = None
-    target: Target | None = None
+    target: TargetMotion | None = None
     target_given: Any = None
     guessed: dict[str, Item] = field(default_factory=dict)
 

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from service.area.geojson import Where, number, quote
-from service.area.model import Target
+from service.area.model import TargetMotion
 
 STILL, WALKS = "still", "walks"
 FASTEST_MPS = 10.0
@@ -23,7 +23,7 @@ _RANGES = {
 EXAMPLE = '{"moves": "walks", "speed_mps": 0.4, "stops_per_hour": 0.3}'
 
 
-def read_target(given: Any, where: Where) -> Target | None:
+def read_target(given: Any, where: Where) -> TargetMotion | None:
     """How the target moves; None: it stands still. Raises BadInput."""
     if not isinstance(given, dict):
         raise where.bad(f"target is {quote(given)}; write {EXAMPLE}")
@@ -49,7 +49,7 @@ def read_target(given: Any, where: Where) -> Target | None:
         return None
     if "speed_mps" not in given:
         raise where.bad("a target that walks needs speed_mps, metres a second, such as 0.4")
-    return Target(**{key: _number(given[key], key, where) for key in _RANGES if key in given})
+    return TargetMotion(**{key: _number(given[key], key, where) for key in _RANGES if key in given})
 
 
 def _number(given: Any, key: str, where: Where) -> float:

@@ -39,7 +39,7 @@ LAST_LOOK_S = 1.0
 """So long a flight that is over waits for them, if there was anybody so lately."""
 
 
-class Flown(Protocol):
+class FlownRun(Protocol):
     """A run as the border needs it, in the process that flies it."""
 
     registry: CollectorRegistry
@@ -89,7 +89,7 @@ _Handler = Callable[[dict[str, Any]], Coroutine[Any, Any, dict[str, Any]]]
 class Counter:
     """Answers one door process. `send` takes a message; the map goes through `shared`."""
 
-    def __init__(self, run: Flown, shared: SharedMap, send: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, run: FlownRun, shared: SharedMap, send: Callable[[dict[str, Any]], None]) -> None:
         self._run, self._shared, self._send = run, shared, send
         self._looking = asyncio.Lock()
         self._free_at = 0.0

@@ -29,7 +29,7 @@ from service.rows import DecisionRow
 from service.telling.searched import POD_AT_LEAST, Outline, outlines
 from service.view.feed import Moment
 from service.view.maps import draw_map, geojson_text, map_text
-from service.view.scene import Ground
+from service.view.scene import SearchGround
 from service.view.state import HeardState, RunState
 
 MOST_WAITING = 20_000
@@ -55,9 +55,9 @@ class _Look:
 
 
 class DistantRun:
-    """A run in another process, as the door needs it (`service.http.run.Run`)."""
+    """A run in another process, as the door needs it (`service.http.run.ShownRun`)."""
 
-    def __init__(self, asking: Asking, shared: SharedMap, ground: Ground, journal: Path) -> None:
+    def __init__(self, asking: Asking, shared: SharedMap, ground: SearchGround, journal: Path) -> None:
         self._asking, self._shared, self._ground, self._journal = asking, shared, ground, journal
         self._outlining = asyncio.Lock()
         self._images = Images(journal.parent)
@@ -105,7 +105,7 @@ class DistantRun:
         """The regions as they are drawn now."""
         return (await self._ground_of(self._last)).described_regions()
 
-    async def _ground_of(self, moment: Moment) -> Ground:
+    async def _ground_of(self, moment: Moment) -> SearchGround:
         """The ground with the regions of a moment, or of a later one, as the journal has them."""
         async with self._outlining:
             if moment.state["drawn"]["number"] > self._ground.drawn:
@@ -169,7 +169,7 @@ class DistantRun:
         self._last = moment
         return _Look(said["ready"], moment, said.get("digest", ""))
 
-    async def _draw(self, draw: Callable[[Ground, _Look], bytes], *, digest: bool = False) -> bytes:
+    async def _draw(self, draw: Callable[[SearchGround, _Look], bytes], *, digest: bool = False) -> bytes:
         look = await self._see(digest=digest)
         ground, loop = await self._ground_of(look.moment), asyncio.get_running_loop()
         return await loop.run_in_executor(self._drawing, draw, ground, look)
@@ -241,16 +241,16 @@ def _frames(reports: Sequence[Report]) -> Iterator[list[str]]:
         yield texts
 
 
-def map_text_of(ground: Ground, look: _Look) -> bytes:
+def map_text_of(ground: SearchGround, look: _Look) -> bytes:
     """The map, cell by cell."""
     return map_text(ground, look.moment, look.digest)
 
 
-def geojson_of(ground: Ground, look: _Look) -> bytes:
+def geojson_of(ground: SearchGround, look: _Look) -> bytes:
     """The map as GeoJSON."""
     return geojson_text(ground, look.moment)
 
 
-def picture_of(ground: Ground, look: _Look) -> bytes:
+def picture_of(ground: SearchGround, look: _Look) -> bytes:
     """The map as a picture."""
     return draw_map(ground, look.moment)

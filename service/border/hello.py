@@ -16,8 +16,8 @@ from service.config import HttpSettings
 from service.doors import Doors
 from service.doors.mqtt import Broker
 from service.http import Access, Door
-from service.telling import Plan
-from service.view.scene import Ground
+from service.telling import TellingPlan
+from service.view.scene import SearchGround
 from service.view.underlay import Underlay
 
 
@@ -31,8 +31,8 @@ class Hello:
     broker: Broker | None
     path: str
     detections_per_s: float
-    telling: Plan
-    ground: Ground
+    telling: TellingPlan
+    ground: SearchGround
     journal: Path
     listener: int
     udp: int | None
@@ -40,7 +40,9 @@ class Hello:
     memory: int
 
     @classmethod
-    def of(cls, door: Door, doors: Doors, telling: Plan, ground: Ground, journal: Path, memory: int) -> Hello:
+    def of(
+        cls, door: Door, doors: Doors, telling: TellingPlan, ground: SearchGround, journal: Path, memory: int
+    ) -> Hello:
         """What a process needs that is to serve these doors."""
         return cls(
             http=door.http,

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from service.border.channel import Channel
-from service.border.counter import Counter, Flown
+from service.border.counter import Counter, FlownRun
 from service.border.frames import Broken
 from service.border.hello import Hello
 from service.border.memory import SharedMap
 from service.doors import Doors
 from service.http import Door
-from service.telling import Plan
-from service.view.scene import Ground
+from service.telling import TellingPlan
+from service.view.scene import SearchGround
 from service.view.state import RunState
 
 log = logging.getLogger("roisearch")
@@ -34,12 +34,17 @@ SILENT_BEATS = 15
 LONGEST_PAUSE_S = 10.0
 END_S = 12.0
 """How long a door process may take to say goodbye, to whoever is connected and whoever is to be told."""
-NOBODY = Plan()
+NOBODY = TellingPlan()
 
 
 @contextlib.asynccontextmanager
 async def serving(
-    door: Door, doors: Doors, run: Flown, ground: Ground, journal: Path, telling: Plan = NOBODY
+    door: Door,
+    doors: Doors,
+    run: FlownRun,
+    ground: SearchGround,
+    journal: Path,
+    telling: TellingPlan = NOBODY,
 ) -> AsyncIterator[None]:
     """Serve strangers in a process of their own until the block ends; it has opened when the block begins.
 
@@ -59,7 +64,7 @@ async def serving(
         os.close(shared.file)
 
 
-async def _keep(keeper: _Doorkeeper, hello: Hello, run: Flown, shared: SharedMap) -> None:
+async def _keep(keeper: _Doorkeeper, hello: Hello, run: FlownRun, shared: SharedMap) -> None:
     """Start another process whenever one ends, after a pause that grows, until cancelled."""
     pause_s = 0.5
     while True:
@@ -85,7 +90,7 @@ class _Doorkeeper:
     """One door process, and the answers it gets."""
 
     def __init__(
-        self, process: Process, channel: Channel, run: Flown, shared: SharedMap, tells: bool
+        self, process: Process, channel: Channel, run: FlownRun, shared: SharedMap, tells: bool
     ) -> None:
         self._process, self._channel, self._run, self._tells = process, channel, run, tells
         self._counter = Counter(run, shared, channel.send)
@@ -95,7 +100,7 @@ class _Doorkeeper:
         self._talking = asyncio.create_task(self._talk())
 
     @classmethod
-    async def start(cls, hello: Hello, run: Flown, shared: SharedMap) -> _Doorkeeper:
+    async def start(cls, hello: Hello, run: FlownRun, shared: SharedMap) -> _Doorkeeper:
         """Start a process and wait until it has opened. Raises RuntimeError when it does not."""
         ours, theirs = socket.socketpair()
         file = hello.write()

@@ -81,19 +81,19 @@ def main(arguments: Sequence[str]) -> int:
 
 def _check_file(file: Path, settings: Settings) -> None:
     """Raises BadInput, before anybody draws, when nothing can be saved there or what is there is no area."""
-    from service.http.plan import Plan
+    from service.http.plan import AreaPlan
 
     folder = file.absolute().parent
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise BadInput(f"{file}: cannot be written there; give --out in a folder that is there and yours")
-    Plan(file, settings).so_far()
+    AreaPlan(file, settings).so_far()
 
 
 async def _draw(file: Path, settings: Settings, door: Door) -> bool:
     """Serve until a search is started (True) or a signal comes."""
-    from service.http.plan import Plan, create_plan_app
+    from service.http.plan import AreaPlan, create_plan_app
 
-    plan = Plan(file, settings)
+    plan = AreaPlan(file, settings)
     server = door.serving(lambda **known: create_plan_app(plan, **known))
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):

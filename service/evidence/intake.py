@@ -33,7 +33,7 @@ from service.evidence.receipts import said_of
 from service.evidence.reports import Receipt, Report
 from service.evidence.sensors import Profile
 from service.evidence.verdict import verdict_on
-from service.evidence.waiting import Batch, Waiting
+from service.evidence.waiting import WaitingBatch, WaitingReport
 from service.geometry import Cell
 from service.journal import Journal, JournalLost
 from service.known import Judgement, Known, Withdrawn
@@ -76,7 +76,7 @@ class Intake:
         self.passes = Passes() if passes is None else passes
         self.counts = Counts()
         self._ids: OrderedDict[str, None] = OrderedDict()
-        self._waiting: list[Waiting] = []
+        self._waiting: list[WaitingReport] = []
         self._working: asyncio.Task[None] | None = None
 
     @property
@@ -122,9 +122,9 @@ class Intake:
         Raises JournalLost when one could not be written; all may be sent again then.
         """
         arrived = time.perf_counter()
-        waiting = [Waiting(report, arrived, report.captured_s) for report in reports]
+        waiting = [WaitingReport(report, arrived, report.captured_s) for report in reports]
         self._place(waiting)
-        batch = Batch(0, asyncio.get_running_loop().create_future())
+        batch = WaitingBatch(0, asyncio.get_running_loop().create_future())
         for each in waiting:
             if each.receipt is None:
                 each.batch = batch
@@ -211,15 +211,15 @@ class Intake:
                 self._fail(piece, error)  # whoever sent them hears of it
 
     @staticmethod
-    def _fail(waiting: Iterable[Waiting], error: Exception) -> None:
+    def _fail(waiting: Iterable[WaitingReport], error: Exception) -> None:
         for each in waiting:
             if each.receipt is None:
                 each.settle(None, error)
 
-    async def _take(self, piece: list[Waiting]) -> None:
+    async def _take(self, piece: list[WaitingReport]) -> None:
         """Work out what each report means, write them all, and then believe them."""
-        new: dict[str, tuple[Waiting, Reading, Observation | None]] = {}
-        repeated: list[Waiting] = []
+        new: dict[str, tuple[WaitingReport, Reading, Observation | None]] = {}
+        repeated: list[WaitingReport] = []
         await self._read(piece)
         try:
             rows = self._understand(piece, new, repeated)
@@ -256,7 +256,7 @@ class Intake:
             if sketch.drawing.words != known:
                 log.info("regions of interest: %s", sketch.drawing.words)
 
-    async def _read(self, piece: list[Waiting]) -> None:
+    async def _read(self, piece: list[WaitingReport]) -> None:
         """Work out what each frame shows, until the time is up; the rest waits again.
 
         In a thread: a frame with hundreds of detections takes a second, in which the flight has its turns.
@@ -280,7 +280,7 @@ class Intake:
             self._waiting += piece[start:]
             del piece[start:]
 
-    def _placed(self, each: Waiting) -> bool:
+    def _placed(self, each: WaitingReport) -> bool:
         """Whether it is known where the frame was taken."""
         try:
             each.pose = self._pose(each.report, each.captured)
@@ -290,9 +290,9 @@ class Intake:
 
     def _understand(
         self,
-        piece: list[Waiting],
-        new: dict[str, tuple[Waiting, Reading, Observation | None]],
-        repeated: list[Waiting],
+        piece: list[WaitingReport],
+        new: dict[str, tuple[WaitingReport, Reading, Observation | None]],
+        repeated: list[WaitingReport],
     ) -> list[tuple[float, str, str, str]]:
         """What each report means. Returns the rows of those in `new`."""
         rows: list[tuple[float, str, str, str]] = []
@@ -325,7 +325,7 @@ class Intake:
             rows.append((self.clock.now(), row.kind, row.key, body))
         return rows
 
-    def _believe(self, each: Waiting, reading: Reading, observation: Observation | None) -> None:
+    def _believe(self, each: WaitingReport, reading: Reading, observation: Observation | None) -> None:
         looks = hits = 0
         if observation is not None:
             self.search.take(observation, each.captured)
@@ -338,7 +338,7 @@ class Intake:
 
     # ---- when and where
 
-    def _place(self, waiting: list[Waiting]) -> None:
+    def _place(self, waiting: list[WaitingReport]) -> None:
         """Put each report at its time of capture in the service's clock, or refuse it."""
         self.moments.measure()
         now, room = self.clock.now(), MOST_WAITING - len(self._waiting)
@@ -362,7 +362,7 @@ class Intake:
         self.counts.refuse(self.clock.now(), report, reason)
         return Receipt(id=report.id, status="refused", reason=reason)
 
-    def _refuse(self, each: Waiting, reason: str) -> None:
+    def _refuse(self, each: WaitingReport, reason: str) -> None:
         each.settle(self.refuse(each.report, reason))
 
     def _pose(self, report: Report, captured: float) -> FramePose:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.evidence.passes import Look, Passes
+from service.evidence.passes import CellLook, Passes
 from service.geometry import Cell
 
 HEADINGS = ("north", "east", "south", "west")
@@ -177,10 +177,10 @@ def grid_heading(heading_deg: float, bearing_deg: float) -> str:
 def observe(passes: Passes, source: str, time: float, reading: Reading) -> Observation | None:
     """The observation that a source's frame of that time adds, or None when it adds nothing new."""
     footprint = reading.footprint
-    looks: dict[Cell, Look] = {}
+    looks: dict[Cell, CellLook] = {}
     columns = (footprint.cells, footprint.counts, footprint.p_tp, footprint.p_tn)
     for (row, col), counts, p_tp, p_tn in zip(*(column.tolist() for column in columns), strict=True):
-        looks[row, col] = Look(counts, p_tp, p_tn, reading.hits.get((row, col)))
+        looks[row, col] = CellLook(counts, p_tp, p_tn, reading.hits.get((row, col)))
     changes = passes.take(source, time, looks)
     if not changes:
         return None

@@ -31,7 +31,7 @@ SILENT_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class CellLook:
     """What one frame says about one cell of its footprint.
 
     counts: it is covered well enough for a look. p_tp, p_tn: the likelihoods of a look from there. ratio: the
@@ -48,7 +48,7 @@ class Look:
         """The factor on the odds of the cell: below 1 for a miss."""
         return (1.0 - self.p_tp) / self.p_tn if self.ratio is None else self.ratio
 
-    def beats(self, other: Look) -> bool:
+    def beats(self, other: CellLook) -> bool:
         """A hit beats a miss, a surer hit a weaker one, a miss from a better place one from a worse."""
         if self.ratio is None:
             return other.ratio is None and self.counts and self.p_tp > other.p_tp
@@ -80,7 +80,7 @@ class _Pass:
     first: float
     last: float
     before: float
-    best: Look | None = None
+    best: CellLook | None = None
     watching: set[str] = field(default_factory=set)
     left: float = -math.inf
 
@@ -107,13 +107,13 @@ class Passes:
         self._sources: dict[str, _Source] = {}
         self._cells: dict[Cell, list[_Pass]] = {}
         self._newest = self._pruned = -math.inf
-        self._unsettled: list[tuple[_Pass, Look | None]] = []
+        self._unsettled: list[tuple[_Pass, CellLook | None]] = []
 
     def __contains__(self, cell: Cell) -> bool:
         """Whether a pass over the cell is going on: flying there brings no other look."""
         return any(one.before == math.inf and one.best is not None for one in self._cells.get(cell, ()))
 
-    def take(self, source: str, time: float, looks: Mapping[Cell, Look]) -> list[Change]:
+    def take(self, source: str, time: float, looks: Mapping[Cell, CellLook]) -> list[Change]:
         """Take in one frame of a source, taken at `time`: the changes that it makes, to be settled or undone."""
         known = self._sources.setdefault(source, _Source())
         changes = [
@@ -140,7 +140,7 @@ class Passes:
             one.best = best
         self._unsettled.clear()
 
-    def _look(self, source: str, known: _Source, time: float, cell: Cell, look: Look) -> Change | None:
+    def _look(self, source: str, known: _Source, time: float, cell: Cell, look: CellLook) -> Change | None:
         """One cell of one frame."""
         one = self._going_on(cell, time)
         if one is None:
@@ -201,7 +201,7 @@ class Passes:
                 del self._cells[cell]
 
 
-def _change(cell: Cell, before: Look | None, after: Look) -> Change:
+def _change(cell: Cell, before: CellLook | None, after: CellLook) -> Change:
     """What has to be told so that a pass counts as `after` where it had counted as `before`."""
     if before is None:
         if after.ratio is None:

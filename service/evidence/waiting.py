@@ -10,7 +10,7 @@ from service.evidence.reports import Receipt, Report
 
 
 @dataclass(slots=True, eq=False)
-class Waiting:
+class WaitingReport:
     """A report on its way in; `receipt` is there once it has arrived. `captured` is in the service's clock."""
 
     report: Report
@@ -20,7 +20,7 @@ class Waiting:
     error: Exception | None = None
     pose: FramePose | None = None
     reading: Reading | Exception | None = None  # what the frame shows, once that is worked out
-    batch: Batch | None = None
+    batch: WaitingBatch | None = None
 
     def settle(self, receipt: Receipt | None, error: Exception | None = None) -> None:
         """Say what became of it; the batch that it came with is told when it is the last of it."""
@@ -32,7 +32,7 @@ class Waiting:
 
 
 @dataclass(slots=True, eq=False)
-class Batch:
+class WaitingBatch:
     """How many of a batch's reports are still on their way, and what is told when none is."""
 
     open: int

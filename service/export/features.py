@@ -13,7 +13,7 @@ import shapely
 
 from service.area.prior import cell_squares
 from service.export.gaps import find_gaps
-from service.export.model import Find, Fix, Run
+from service.export.model import ExportedFind, ExportedRun, Fix
 from service.export.wishes import Wishes
 from service.view.shapes import on_earth
 
@@ -21,7 +21,7 @@ _CORNERS = 48
 
 
 @dataclass(frozen=True)
-class Item:
+class PlacedItem:
     """A thing with a place.
 
     Attributes:
@@ -41,14 +41,17 @@ class Item:
     facts: dict[str, Any] = field(default_factory=dict)
 
 
-def items(run: Run, wishes: Wishes) -> list[Item]:
+def items(run: ExportedRun, wishes: Wishes) -> list[PlacedItem]:
     """Everything, from the ground up: what is listed later is drawn on top."""
     return [
         *_ground(run),
         *_regions(run),
         *_gaps(run, wishes),
-        *(Item("track", _called(number, piece), fixes=piece) for number, piece in enumerate(run.track, 1)),
-        *(Item("hit", f"hit {number}", _point(*at)) for number, at in enumerate(run.hits, 1)),
+        *(
+            PlacedItem("track", _called(number, piece), fixes=piece)
+            for number, piece in enumerate(run.track, 1)
+        ),
+        *(PlacedItem("hit", f"hit {number}", _point(*at)) for number, at in enumerate(run.hits, 1)),
         *_detections(run),
         *_found(run),
     ]
@@ -70,26 +73,26 @@ def _point(lat: float, lon: float) -> shapely.Point:
     return shapely.Point(lon, lat)
 
 
-def _ground(run: Run) -> Iterable[Item]:
+def _ground(run: ExportedRun) -> Iterable[PlacedItem]:
     area = run.area
-    yield Item("search", area.name, area.polygon)
+    yield PlacedItem("search", area.name, area.polygon)
     for number, exclusion in enumerate(area.exclusions, 1):
         facts = {"searchable": exclusion.searchable}
-        yield Item("exclude", f"exclusion {number}", exclusion.polygon, facts=facts)
-    yield Item("launch", "launch", _point(*run.grid.launch))
+        yield PlacedItem("exclude", f"exclusion {number}", exclusion.polygon, facts=facts)
+    yield PlacedItem("launch", "launch", _point(*run.grid.launch))
 
 
-def _regions(run: Run) -> Iterable[Item]:
+def _regions(run: ExportedRun) -> Iterable[PlacedItem]:
     squares, poa = cell_squares(run.frame), run.poa
     for number in range(1, int(run.labels.max(initial=0)) + 1):
         inside = run.labels == number
         if inside.any():
             facts = {"poa": float(poa[inside].sum()), "pod": float(run.pod[inside].mean())}
             shape = on_earth(run.frame, shapely.union_all(squares[inside]))
-            yield Item("region", f"ROI {number}", shape, facts=facts)
+            yield PlacedItem("region", f"ROI {number}", shape, facts=facts)
 
 
-def _gaps(run: Run, wishes: Wishes) -> Iterable[Item]:
+def _gaps(run: ExportedRun, wishes: Wishes) -> Iterable[PlacedItem]:
     for number, gap in enumerate(find_gaps(run, wishes), 1):
         facts = {
             "poa": gap.poa,
@@ -99,10 +102,10 @@ def _gaps(run: Run, wishes: Wishes) -> Iterable[Item]:
             "flyable": gap.flyable,
             "place": run.written(*gap.middle),
         }
-        yield Item("gap", f"gap {number}", gap.polygon, facts=facts)
+        yield PlacedItem("gap", f"gap {number}", gap.polygon, facts=facts)
 
 
-def _detections(run: Run) -> Iterable[Item]:
+def _detections(run: ExportedRun) -> Iterable[PlacedItem]:
     for number, each in enumerate(run.detections, 1):
         facts = {
             "class": each.kind,
@@ -111,12 +114,12 @@ def _detections(run: Run) -> Iterable[Item]:
             "counted": each.counted,
             "place": run.written(each.lat, each.lon),
         }
-        yield Item(
+        yield PlacedItem(
             "detection", f"detection {number}", _point(each.lat, each.lon), time=each.time, facts=facts
         )
 
 
-def _found(run: Run) -> Iterable[Item]:
+def _found(run: ExportedRun) -> Iterable[PlacedItem]:
     """The find, and the ellipse that holds the target with 95 % if it is there."""
     find = run.find
     if find is None:
@@ -128,16 +131,18 @@ def _found(run: Run) -> Iterable[Item]:
         "bearing_deg": round(bearing, 1),
     }
     name = "where the target is with 95 %"
-    yield Item("uncertainty", name, on_earth(run.frame, _ellipse(run, find)), facts={"holds": 0.95, **spread})
+    yield PlacedItem(
+        "uncertainty", name, on_earth(run.frame, _ellipse(run, find)), facts={"holds": 0.95, **spread}
+    )
     facts = {
         "probability": find.probability,
         "sigma_m": find.sigma_m,
         "place": run.written(find.lat, find.lon),
     }
-    yield Item("found", "found", _point(find.lat, find.lon), time=find.time, facts=facts)
+    yield PlacedItem("found", "found", _point(find.lat, find.lon), time=find.time, facts=facts)
 
 
-def _ellipse(run: Run, find: Find) -> shapely.Polygon:
+def _ellipse(run: ExportedRun, find: ExportedFind) -> shapely.Polygon:
     """In the grid's metres (east, south), whose north is turned from the true one."""
     major, minor, bearing = find.ellipse
     turned = math.radians(bearing - run.frame.bearing_deg)

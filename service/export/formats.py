@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from service.export.model import Run
+    from service.export.model import ExportedRun
     from service.export.wishes import Wishes
 
 
@@ -19,7 +19,7 @@ class Format:
     suffix: str
     about: str
 
-    def write(self, run: Run, wishes: Wishes) -> bytes:
+    def write(self, run: ExportedRun, wishes: Wishes) -> bytes:
         """The content of a file of this format. Raises BadInput when the run has nothing to put into it."""
         data: bytes = importlib.import_module(f"service.export.{self.module}").write(run, wishes)
         return data

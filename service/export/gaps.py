@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from service.area.frame import BoolArray
 from service.area.prior import cell_squares
-from service.export.model import Run
+from service.export.model import ExportedRun
 from service.export.wishes import Wishes
 from service.geometry import LatLon
 from service.view.shapes import on_earth
@@ -46,7 +46,7 @@ class Gap:
     flyable: bool
 
 
-def gap_cells(run: Run, wishes: Wishes) -> BoolArray:
+def gap_cells(run: ExportedRun, wishes: Wishes) -> BoolArray:
     """The cells that are gaps, bool [rows, cols]."""
     grid = run.grid
     average = (1.0 - grid.outside) / int(grid.searchable.sum())
@@ -55,7 +55,7 @@ def gap_cells(run: Run, wishes: Wishes) -> BoolArray:
     )
 
 
-def find_gaps(run: Run, wishes: Wishes) -> list[Gap]:
+def find_gaps(run: ExportedRun, wishes: Wishes) -> list[Gap]:
     """The gaps, the one with the most probability first."""
     frame, grid, poa = run.frame, run.grid, run.poa
     labels, count = ndimage.label(gap_cells(run, wishes))

@@ -7,13 +7,13 @@ from typing import Any
 
 import shapely
 
-from service.export.features import Item, iso, items
-from service.export.model import Run
+from service.export.features import PlacedItem, iso, items
+from service.export.model import ExportedRun
 from service.export.wishes import Wishes
 from service.view.shapes import DIGITS, collection, feature, plain, point
 
 
-def write(run: Run, wishes: Wishes) -> bytes:
+def write(run: ExportedRun, wishes: Wishes) -> bytes:
     """The run as a FeatureCollection; its own properties are in `run`, which readers may ignore."""
     said = {
         "name": run.name,
@@ -30,7 +30,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
     ).encode()
 
 
-def _feature(item: Item) -> dict[str, Any]:
+def _feature(item: PlacedItem) -> dict[str, Any]:
     properties: dict[str, Any] = {"name": item.name, **item.facts}
     if item.time is not None:
         properties["time"] = iso(item.time)

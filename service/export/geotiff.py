@@ -15,7 +15,7 @@ from service.area.frame import GridFrame
 from service.area.geotiff import POA_BAND
 from service.errors import BadInput
 from service.export.features import iso
-from service.export.model import Run
+from service.export.model import ExportedRun
 from service.export.wishes import Wishes
 
 NODATA = -1.0
@@ -26,7 +26,7 @@ BANDS = (
 )
 
 
-def write(run: Run, wishes: Wishes) -> bytes:
+def write(run: ExportedRun, wishes: Wishes) -> bytes:
     """Three float64 bands, `NODATA` where nothing is searched; POA and prior sum to 1 with what is outside."""
     try:
         from rasterio.crs import CRS

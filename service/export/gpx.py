@@ -6,16 +6,16 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 
-from service.export.features import Item, iso, items
+from service.export.features import PlacedItem, iso, items
 from service.export.gaps import find_gaps
-from service.export.model import Run
+from service.export.model import ExportedRun
 from service.export.wishes import Wishes
 
 NAMESPACE = "http://www.topografix.com/GPX/1/1"
 SYMBOLS = {"launch": "Helipad", "found": "Flag, Red", "hit": "Flag, Blue", "gap": "Crossing"}
 
 
-def write(run: Run, wishes: Wishes) -> bytes:
+def write(run: ExportedRun, wishes: Wishes) -> bytes:
     """The run; that its heights are above the launch point and not the sea is said in the track's `desc`."""
     ET.register_namespace("", NAMESPACE)
     root = ET.Element(_tag("gpx"), {"version": "1.1", "creator": "roisearch"})
@@ -46,7 +46,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
 
 
-def _marks(run: Run, wishes: Wishes) -> Iterator[tuple[float, float, str, str, str, float | None]]:
+def _marks(run: ExportedRun, wishes: Wishes) -> Iterator[tuple[float, float, str, str, str, float | None]]:
     """Points: lat, lon, role, name, note, time."""
     for number, gap in enumerate(find_gaps(run, wishes), 1):
         note = f"fly again: {gap.poa:.1%} of the probability, {gap.area_m2 / 1e4:.1f} ha, POD {gap.pod:.0%}"
@@ -57,7 +57,7 @@ def _marks(run: Run, wishes: Wishes) -> Iterator[tuple[float, float, str, str, s
             yield item.shape.y, item.shape.x, item.role, item.name, _note(item), item.time
 
 
-def _note(item: Item) -> str:
+def _note(item: PlacedItem) -> str:
     said = [
         f"{name} {value if isinstance(value, str) else f'{value:.4g}'}" for name, value in item.facts.items()
     ]

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from service.export.features import Item, iso, items
-from service.export.model import Run
+from service.export.features import PlacedItem, iso, items
+from service.export.model import ExportedRun
 from service.export.wishes import Wishes
 
 NAMESPACE = "http://www.opengis.net/kml/2.2"
@@ -39,7 +39,7 @@ FILLS = {"gap": "550055ff", "exclude": "660000ff", "uncertainty": "3300ffff"}
 HIDDEN = ("detection", "region")
 
 
-def write(run: Run, wishes: Wishes) -> bytes:
+def write(run: ExportedRun, wishes: Wishes) -> bytes:
     """The run as one document."""
     ET.register_namespace("", NAMESPACE)
     root = ET.Element(_tag("kml"))
@@ -65,7 +65,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
 
 
-def _placemark(folder: ET.Element, item: Item, amsl_m: float | None) -> None:
+def _placemark(folder: ET.Element, item: PlacedItem, amsl_m: float | None) -> None:
     """One thing; the order of the elements is that of the schema. A track is drawn at its heights where `amsl_m`, that
     of the ground at the launch point, is known, else on the ground."""
     mark = ET.SubElement(folder, _tag("Placemark"))

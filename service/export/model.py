@@ -34,7 +34,7 @@ class Fix:
 
 
 @dataclass(frozen=True)
-class Detection:
+class PlacedDetection:
     """What a detector reported at a place (degrees); `counted`: the frame put a hit into the map."""
 
     time: float
@@ -47,7 +47,7 @@ class Detection:
 
 
 @dataclass(frozen=True)
-class Find:
+class ExportedFind:
     """The place at which the search counted its target as found; `sigma_m` metres along the longest axis.
 
     `ellipse` holds the target with 95 %: semi-axes in metres, and the bearing of the long one in degrees from true
@@ -65,7 +65,7 @@ class Find:
 
 
 @dataclass(frozen=True)
-class Moment:
+class TimelineEntry:
     """Something that happened, for the timeline: what kind of thing, and in words."""
 
     time: float
@@ -74,7 +74,7 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class ExportedRun:
     """One run. Arrays are [rows, cols]; times in the service's clock, seconds since the epoch.
 
     Attributes:
@@ -103,9 +103,9 @@ class Run:
     curve: tuple[tuple[float, float], ...]
     track: tuple[tuple[Fix, ...], ...]
     hits: tuple[LatLon, ...]
-    detections: tuple[Detection, ...]
-    find: Find | None
-    timeline: tuple[Moment, ...]
+    detections: tuple[PlacedDetection, ...]
+    find: ExportedFind | None
+    timeline: tuple[TimelineEntry, ...]
     autopilot: str
     launch_amsl_m: float | None
     state: str

@@ -15,7 +15,7 @@ import numpy as np
 from service.chances import share, sure
 from service.export.features import iso
 from service.export.gaps import Gap, find_gaps
-from service.export.model import Detection, Run
+from service.export.model import ExportedRun, PlacedDetection
 from service.export.pictures import WELL, draw_curve, draw_gaps, draw_maps
 from service.export.wishes import Wishes
 from service.mission.states import State
@@ -43,7 +43,7 @@ img { max-width: 100%; height: auto; } .small { color: #46525f; font-size: .88re
 """
 
 
-def write(run: Run, wishes: Wishes) -> bytes:
+def write(run: ExportedRun, wishes: Wishes) -> bytes:
     """The page, UTF-8: in print the first sheet is what everybody reads, and the rest an appendix."""
     gaps = find_gaps(run, wishes)
     title = f"Search report: {run.area.name}"
@@ -83,7 +83,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
     return (page + "\n".join(parts) + "\n</main></body></html>\n").encode()
 
 
-def _status(run: Run) -> str:
+def _status(run: ExportedRun) -> str:
     return (
         "The run is over."
         if run.over
@@ -91,7 +91,7 @@ def _status(run: Run) -> str:
     )
 
 
-def _lead(run: Run) -> str:
+def _lead(run: ExportedRun) -> str:
     """The one paragraph that everybody reads."""
     if run.find is not None:
         find = run.find
@@ -116,7 +116,7 @@ def _lead(run: Run) -> str:
     return f'<p class="lead">{text}</p>'
 
 
-def _numbers(run: Run) -> str:
+def _numbers(run: ExportedRun) -> str:
     hectare = run.frame.cell_m**2 / 1e4
     covered = run.grid.covered
     ground = float(covered.sum()) * hectare
@@ -149,7 +149,7 @@ def _together(gaps: int) -> str:
     return "There is one; it holds" if gaps == 1 else f"There are {gaps}; together they hold"
 
 
-def _regions(run: Run) -> str:
+def _regions(run: ExportedRun) -> str:
     """The places that stood out before the search: what they hold now and how well they were searched."""
     rows = []
     for number in range(1, int(run.labels.max(initial=0)) + 1):
@@ -169,7 +169,7 @@ def _regions(run: Run) -> str:
     return _table("Likely places", heads, rows[:MOST_ROWS]) + _more(len(rows))
 
 
-def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
+def _where_not(run: ExportedRun, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
     average = f"{wishes.poa_above:g} times an average cell's probability"
     level = f"a POD below {share(wishes.pod_below)} and {average} or more"
     if not gaps:
@@ -198,7 +198,7 @@ def _where_not(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> Iterable[str]:
         yield _more(len(gaps))
 
 
-def _no_gap(run: Run, level: str) -> str:
+def _no_gap(run: ExportedRun, level: str) -> str:
     """That nothing is worth another flight, without saying more than was searched."""
     ground = run.grid.searchable
     never = float((ground & (run.pod <= 0.0)).sum()) / max(int(ground.sum()), 1)
@@ -211,7 +211,7 @@ def _no_gap(run: Run, level: str) -> str:
     )
 
 
-def _what_was_found(run: Run) -> Iterable[str]:
+def _what_was_found(run: ExportedRun) -> Iterable[str]:
     if not run.detections:
         hits = f"; {len(run.hits)} cells had a hit" if run.hits else ""
         yield f"<p>The detector reported nothing at a place{hits}.</p>"
@@ -237,9 +237,9 @@ def _what_was_found(run: Run) -> Iterable[str]:
     yield _more(len(seen))
 
 
-def sightings(run: Run) -> list[list[Detection]]:
+def sightings(run: ExportedRun) -> list[list[PlacedDetection]]:
     """Detections that are most likely the same thing, together: one class, within a cell, not long after each other."""
-    seen: list[list[Detection]] = []
+    seen: list[list[PlacedDetection]] = []
     for each in run.detections:
         lately = seen[-LATELY:]
         metres = run.frame.to_metres([(each.lat, each.lon), *((old[-1].lat, old[-1].lon) for old in lately)])
@@ -254,7 +254,7 @@ def sightings(run: Run) -> list[list[Detection]]:
     return seen
 
 
-def _happened(run: Run) -> Iterable[tuple[str, str]]:
+def _happened(run: ExportedRun) -> Iterable[tuple[str, str]]:
     """The timeline, with the states as the page says them."""
     for moment in run.timeline[:MOST_ROWS]:
         text = _CHANGE.sub(_in_words, moment.text) if moment.kind == "state" else moment.text
@@ -266,7 +266,7 @@ def _in_words(change: re.Match[str]) -> str:
     return f"{before} → {after}"
 
 
-def _words(run: Run) -> str:
+def _words(run: ExportedRun) -> str:
     sensor, flight = run.settings.sensor, run.settings.flight
     facts = [
         "POA, probability of area: how probable it is that the target is in a piece of ground.",

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from service.export.gaps import Gap, gap_cells
-from service.export.model import Run
+from service.export.model import ExportedRun
 from service.export.wishes import Wishes
 from service.view.picture import PictureScene, draw_belief, draw_one, draw_pod
 from service.view.sheet import Sheet
@@ -23,7 +23,7 @@ COLOURS = ("#dfe4e8", "#b00020", "#fda03c", "#005c6e")
 NAMES = ("little probability, little searched", "gap: fly again", "searched once or badly", "searched well")
 
 
-def draw_maps(run: Run) -> tuple[bytes, bytes]:
+def draw_maps(run: ExportedRun) -> tuple[bytes, bytes]:
     """Two maps as PNGs: the belief, and how well each cell was searched."""
     here, find = run.aircraft, run.find
     scene = PictureScene(
@@ -44,7 +44,7 @@ def draw_maps(run: Run) -> tuple[bytes, bytes]:
     return draw_one(scene, draw_belief), draw_one(scene, draw_pod)
 
 
-def draw_gaps(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> bytes:
+def draw_gaps(run: ExportedRun, gaps: Sequence[Gap], wishes: Wishes) -> bytes:
     """The ground in four classes, with the numbers of the gaps, as a PNG."""
     classes = np.where(run.pod >= WELL, 3.0, np.where(run.pod >= wishes.pod_below, 2.0, 0.0))
     classes = np.where(gap_cells(run, wishes), 1.0, classes)
@@ -61,7 +61,7 @@ def draw_gaps(run: Run, gaps: Sequence[Gap], wishes: Wishes) -> bytes:
     return png(figure)
 
 
-def draw_curve(run: Run) -> bytes:
+def draw_curve(run: ExportedRun) -> bytes:
     """POS over the minutes of the run, as a PNG."""
     figure = Figure(figsize=(4.4, 2.4), dpi=180, layout="constrained")
     axes = figure.subplots()

@@ -21,7 +21,7 @@ import shapely
 from roisearch.detection import DetectionRecord
 from service.area import way_home
 from service.errors import BadInput
-from service.export.model import Run
+from service.export.model import ExportedRun
 from service.export.wishes import Wishes
 from service.geometry import Cell, LatLon
 from service.ground.route import route_over
@@ -46,7 +46,7 @@ GLOBAL_RELATIVE, MISSION = 3, 2  # MAV_FRAME
 PX4, ARDUPILOT, QUADROTOR = 12, 3, 2  # MAV_AUTOPILOT, MAV_TYPE
 
 
-def write(run: Run, wishes: Wishes) -> bytes:
+def write(run: ExportedRun, wishes: Wishes) -> bytes:
     """The plan as JSON. Raises BadInput when nothing is left to search."""
     if run.find is not None:
         raise BadInput(f"{run.name}: the target was found, so there is nothing left to plan for")
@@ -82,7 +82,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
     return json.dumps(plan, indent=2, allow_nan=False).encode()
 
 
-def heights_of(run: Run, route: list[LatLon]) -> tuple[list[LatLon], list[float]]:
+def heights_of(run: ExportedRun, route: list[LatLon]) -> tuple[list[LatLon], list[float]]:
     """The waypoints, and the height of the take-off and of each of them above the launch point.
 
     Over ground with heights there are more, so that each leg clears the ground, and the last is above the launch point:
@@ -99,7 +99,7 @@ def heights_of(run: Run, route: list[LatLon]) -> tuple[list[LatLon], list[float]
     return list(over.points[1:]), list(over.heights)
 
 
-def mission_route(run: Run, wishes: Wishes) -> list[LatLon]:
+def mission_route(run: ExportedRun, wishes: Wishes) -> list[LatLon]:
     """The waypoints (lat, lon) in order, without take-off and landing."""
     search = Search(run.grid, run.settings)
     search.known.belief = run.belief.copy()
@@ -136,7 +136,7 @@ def turning_cells(cells: Sequence[Cell]) -> list[Cell]:
     return turns
 
 
-def _seconds(run: Run, wishes: Wishes) -> float:
+def _seconds(run: ExportedRun, wishes: Wishes) -> float:
     """How long the search itself may take: the mission less take-off, landing and the longest way home."""
     grid, flight = run.grid, run.settings.flight
     farthest = route_seconds(grid, flight, farthest_from_launch(grid), grid.launch)
@@ -165,7 +165,7 @@ def _item(command: int, frame: int, params: list[float | None]) -> dict[str, Any
     return item
 
 
-def _fence(run: Run, points: Sequence[LatLon]) -> list[dict[str, Any]]:
+def _fence(run: ExportedRun, points: Sequence[LatLon]) -> list[dict[str, Any]]:
     """What encloses every waypoint, and the exclusions, which the route keeps `CLEARANCE_M` away from."""
     frame = run.frame
     hull = shapely.convex_hull(shapely.MultiPoint(frame.to_metres(points)))

@@ -17,7 +17,7 @@ from service.chances import sure
 from service.config import Settings, each_aircraft
 from service.entries import Entry, understanding
 from service.evidence.found import Found
-from service.export.model import Detection, Find, Fix, Moment, Run
+from service.export.model import ExportedFind, ExportedRun, Fix, PlacedDetection, TimelineEntry
 from service.mission.states import Event
 from service.places import Coordinates, written
 from service.resume import retrace, stored_run
@@ -31,11 +31,11 @@ BREAK_S = 60.0
 """A track is broken where nothing was heard of the aircraft for so long."""
 
 
-def read_run(folder: Path) -> Run:
+def read_run(folder: Path) -> ExportedRun:
     """Read a run from its folder, whether it is under way or over. Raises BadInput."""
     settings, area, grid, entries = stored_run(folder)
     search, curve, stories = Search(grid, settings), PosCurve(), StoriesSoFar(each_aircraft(settings))
-    finds: list[Find] = []
+    finds: list[ExportedFind] = []
     for entry in entries:
         with understanding(folder / JOURNAL, entry.seq, entry.said.kind):
             retrace(entry, search)
@@ -46,7 +46,7 @@ def read_run(folder: Path) -> Run:
             finds.append(_find(entry.time, entry.said.found))
     how = settings.run.coordinates
     reports = [entry for entry in entries if isinstance(entry.said, ReportRow)]
-    return Run(
+    return ExportedRun(
         name=folder.resolve().name,
         area=area,
         grid=grid,
@@ -105,7 +105,7 @@ def _pieces(fixes: Iterable[Fix], landed: Sequence[float]) -> tuple[tuple[Fix, .
     return tuple(tuple(piece) for piece in pieces if len(piece) > 1)
 
 
-def _detections(entry: Entry) -> Iterable[Detection]:
+def _detections(entry: Entry) -> Iterable[PlacedDetection]:
     """What a report has seen; one that is told in pixels stands where the service placed it, if it did."""
     assert isinstance(entry.said, ReportRow)
     report, observed = entry.said.report, entry.said.observation
@@ -117,7 +117,7 @@ def _detections(entry: Entry) -> Iterable[Detection]:
             if len(placed) != len(seen):
                 continue
             lat, lon = placed[number].lat, placed[number].lon
-        yield Detection(
+        yield PlacedDetection(
             time=entry.said.captured,
             lat=float(lat),
             lon=float(lon),
@@ -134,31 +134,33 @@ def _plain(text: object) -> str:
     return "".join(c if c.isprintable() else "?" for c in whole)
 
 
-def _find(time: float, found: Found) -> Find:
+def _find(time: float, found: Found) -> ExportedFind:
     around = found.ellipse
     ellipse = (around["semi_major_m"], around["semi_minor_m"], around["bearing_deg"])
-    return Find(time, found.lat, found.lon, found.probability, found.sigma_m, ellipse)
+    return ExportedFind(time, found.lat, found.lon, found.probability, found.sigma_m, ellipse)
 
 
-def _moment(entry: Entry, how: Coordinates) -> Iterable[Moment]:
+def _moment(entry: Entry, how: Coordinates) -> Iterable[TimelineEntry]:
     """What belongs into the timeline, and of which aircraft it is; decisions and waypoints are too many."""
     whose = f"aircraft {entry.aircraft}: " if entry.aircraft else ""
     match entry.said:
         case TransitionRow(before=before, after=after, reason=reason):
-            yield Moment(entry.time, "state", f"{whose}{before} → {after}: {reason}")
+            yield TimelineEntry(entry.time, "state", f"{whose}{before} → {after}: {reason}")
         case OrderRow(command=command):
-            yield Moment(entry.time, "order", f"{whose}operator: {command}")
+            yield TimelineEntry(entry.time, "order", f"{whose}operator: {command}")
         case VerdictRow(confirmed=confirmed):
-            yield Moment(entry.time, "verdict", f"operator: {'it is' if confirmed else 'it is not'} here")
+            yield TimelineEntry(
+                entry.time, "verdict", f"operator: {'it is' if confirmed else 'it is not'} here"
+            )
         case ModeRow(mode=mode, commanded=False):
-            yield Moment(entry.time, "mode", f"{whose}the autopilot changed to {mode}")
+            yield TimelineEntry(entry.time, "mode", f"{whose}the autopilot changed to {mode}")
         case FoundRow(found=found):
             place = written((found.lat, found.lon), how)
-            yield Moment(entry.time, "found", f"found at {place}, {sure(found.probability)} sure")
+            yield TimelineEntry(entry.time, "found", f"found at {place}, {sure(found.probability)} sure")
 
 
-def _first(entry: Entry) -> Moment:
-    return Moment(entry.time, "start", "the journal begins")
+def _first(entry: Entry) -> TimelineEntry:
+    return TimelineEntry(entry.time, "start", "the journal begins")
 
 
 def _autopilot(entries: Sequence[Entry]) -> str:

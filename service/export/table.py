@@ -7,13 +7,13 @@ import io
 from collections.abc import Iterator
 
 from service.export.features import iso
-from service.export.model import Run
+from service.export.model import ExportedRun
 from service.export.wishes import Wishes
 
 COLUMNS = ("time_utc", "what", "lat", "lon", "height_m", "heading_deg", "probability", "note")
 
 
-def write(run: Run, wishes: Wishes) -> bytes:
+def write(run: ExportedRun, wishes: Wishes) -> bytes:
     """Track, detections, find and timeline; UTF-8 with a byte order mark, without which Excel guesses wrong."""
     text = io.StringIO()
     table = csv.writer(text)
@@ -23,7 +23,7 @@ def write(run: Run, wishes: Wishes) -> bytes:
     return text.getvalue().encode("utf-8-sig")
 
 
-def _rows(run: Run) -> Iterator[tuple[float, tuple[str, ...]]]:
+def _rows(run: ExportedRun) -> Iterator[tuple[float, tuple[str, ...]]]:
     """Time and the other columns."""
     for piece in run.track:
         for fix in piece:

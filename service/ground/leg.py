@@ -21,7 +21,7 @@ _MOST_SAMPLES = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class GroundProfile:
     """The ground along a leg.
 
     Attributes:
@@ -46,17 +46,17 @@ class Profile:
         return float(self.roof.max())
 
 
-def profile(relief: Relief, start: Metres, end: Metres, *, ahead_m: float = 0.0) -> Profile:
+def profile(relief: Relief, start: Metres, end: Metres, *, ahead_m: float = 0.0) -> GroundProfile:
     """The ground along the straight leg between two places (east, south); `ahead_m`: the braking distance."""
     length = math.hypot(end[0] - start[0], end[1] - start[1])
     if not math.isfinite(length):
-        return Profile(np.zeros(1), np.full(1, np.inf), np.full(1, np.nan))
+        return GroundProfile(np.zeros(1), np.full(1, np.inf), np.full(1, np.nan))
     pieces = max(1, math.ceil(length / (0.5 * relief.step_m)))
     if pieces > _MOST_SAMPLES:
-        return Profile(np.array([0.0, length]), np.full(2, np.inf), np.full(2, np.nan))
+        return GroundProfile(np.array([0.0, length]), np.full(2, np.inf), np.full(2, np.nan))
     share = np.linspace(0.0, 1.0, pieces + 1)
     points = np.array(start) + share[:, None] * (np.array(end) - np.array(start))
-    return Profile(
+    return GroundProfile(
         share * length, _ahead(relief.roof_at(points), share * length, ahead_m), relief.height_at(points)
     )
 
@@ -71,7 +71,7 @@ def _ahead(roof: Floats, along: Floats, ahead_m: float) -> Floats:
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, count + 1).max(axis=1))
 
 
-def lowest_path(seen: Profile, start_m: float, end_m: float, climb_per_m: float) -> Floats:
+def lowest_path(seen: GroundProfile, start_m: float, end_m: float, climb_per_m: float) -> Floats:
     """The lowest that the aircraft may be along a leg that begins and ends at these heights: float [n].
 
     `climb_per_m` is how much it surely climbs in a metre over ground.
@@ -93,7 +93,7 @@ def passing(
     return start_m + along_m / length_m * rise, start_m + soon
 
 
-def highest_above(seen: Profile, start_m: float, end_m: float, sink_per_m: float) -> float:
+def highest_above(seen: GroundProfile, start_m: float, end_m: float, sink_per_m: float) -> float:
     """How high above the ground below the aircraft may be at the most on a leg that begins and ends at these heights.
 
     `sink_per_m` is how much it surely sinks in a metre over ground; it may climb at once. Minus infinity where none of
@@ -111,7 +111,7 @@ class Least:
     along_m: float
 
 
-def least_clearance(seen: Profile, start_m: float, end_m: float, climb_per_m: float) -> Least:
+def least_clearance(seen: GroundProfile, start_m: float, end_m: float, climb_per_m: float) -> Least:
     """How near to the ground a leg comes, between these heights above the launch point."""
     clear = lowest_path(seen, start_m, end_m, climb_per_m) - seen.roof
     where = int(np.argmin(clear))

@@ -11,7 +11,7 @@ import numpy as np
 from service.area import Grid
 from service.config import SPARE_M, FlightSettings
 from service.geometry import LatLon
-from service.ground.leg import Profile, profile
+from service.ground.leg import GroundProfile, profile
 from service.ground.relief import Floats, Relief
 
 _PIECE_M = 60.0
@@ -78,5 +78,5 @@ def from_the_side(grid: Grid, relief: Relief, route: Route) -> SideView:
     return SideView(*(np.concatenate(column) for column in zip(*columns, strict=True)))
 
 
-def _leg(relief: Relief, start: Floats, end: Floats) -> Profile:
+def _leg(relief: Relief, start: Floats, end: Floats) -> GroundProfile:
     return profile(relief, (float(start[0]), float(start[1])), (float(end[0]), float(end[1])))

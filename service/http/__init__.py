@@ -13,16 +13,16 @@ It listens on loopback unless told otherwise; on any other address it wants bear
 from service.http.access import Access, Scope, read_access
 from service.http.address import bind, split_address, url_of
 from service.http.app import create_app
-from service.http.run import PastRun, Run
+from service.http.run import PastRun, ShownRun
 from service.http.server import Door, Server, open_door
 
 __all__ = [
     "Access",
     "Door",
     "PastRun",
-    "Run",
     "Scope",
     "Server",
+    "ShownRun",
     "bind",
     "create_app",
     "open_door",

@@ -25,9 +25,9 @@ from service.http.access import Access
 from service.http.docs import describe_api
 from service.http.events import Watchers
 from service.http.guard import Guard, Refusal, client_of, too_many
-from service.http.page import FOLDER, PICTURE_HEADERS, Parts, policy
+from service.http.page import FOLDER, PICTURE_HEADERS, PageFiles, policy
 from service.http.rate import Buckets
-from service.http.run import PastRun, Run, Sight, Unanswered
+from service.http.run import PastRun, ShownMoment, ShownRun, Unanswered
 from service.journal import JournalLost
 from service.news.request import EXAMPLES as NEWS_EXAMPLES
 from service.news.request import NewsRequest
@@ -48,7 +48,7 @@ _MOST_DECISIONS = 1000
 
 
 def create_app(
-    run: Run,
+    run: ShownRun,
     *,
     http: HttpSettings | None = None,
     access: Access | None = None,
@@ -173,7 +173,7 @@ def create_app(
         only_live()
         return await run.withdraw(name)
 
-    def then(at: float | None) -> Sight:
+    def then(at: float | None) -> ShownMoment:
         if at is None:
             return run
         if past is None:
@@ -287,7 +287,7 @@ def create_app(
     async def docs() -> Response:
         return HTMLResponse(describe_api(app.openapi()), headers={"content-security-policy": policy()})
 
-    app.mount("/page", Parts(directory=FOLDER))
+    app.mount("/page", PageFiles(directory=FOLDER))
     return app
 
 

@@ -20,7 +20,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from service.http.access import Scope
 from service.http.guard import MAY, SUBPROTOCOL, client_of
-from service.http.run import PastRun, Run, Unanswered
+from service.http.run import PastRun, ShownRun, Unanswered
 from service.view.feed import Feed
 
 EVERY_S = 0.25
@@ -34,7 +34,7 @@ TRY_AGAIN_LATER = 1013  # RFC 6455's registry of close codes
 class Watchers:
     """Who watches one run."""
 
-    def __init__(self, run: Run, past: PastRun | None, extra: dict[str, Any]) -> None:
+    def __init__(self, run: ShownRun, past: PastRun | None, extra: dict[str, Any]) -> None:
         """`past`: the run, when it is over; `extra`: what else the page has to know at the start."""
         self._run, self._past, self._extra = run, past, extra
         self._watching: Counter[str] = Counter()

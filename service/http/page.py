@@ -19,7 +19,7 @@ PICTURE_HEADERS = {
 """A stranger's picture is shown and nothing else: whatever is in it, no browser runs it."""
 
 
-class Parts(StaticFiles):
+class PageFiles(StaticFiles):
     """The page's files; a browser keeps them, and asks each time whether they are still the same."""
 
     def file_response(self, *args: Any, **kwargs: Any) -> Response:

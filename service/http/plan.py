@@ -22,7 +22,7 @@ from service.errors import BadInput
 from service.http.access import Access
 from service.http.app import complaints
 from service.http.guard import Guard, Refusal
-from service.http.page import FOLDER, Parts, policy
+from service.http.page import FOLDER, PageFiles, policy
 from service.http.rate import Buckets
 from service.places import written
 from service.survey import read_survey, survey
@@ -31,7 +31,7 @@ from service.view.underlay import NO_UNDERLAY, Underlay
 MOST_FEATURES = 500
 
 
-class Drawing(BaseModel):
+class DrawnFeatures(BaseModel):
     """What was drawn: GeoJSON features with roles, as area files have them."""
 
     model_config = ConfigDict(extra="forbid")
@@ -41,7 +41,7 @@ class Drawing(BaseModel):
     features: list[dict[str, Any]] = Field(max_length=MOST_FEATURES)
 
 
-class Plan:
+class AreaPlan:
     """An area that is being drawn, and its file. `started` is set when a search of it is to begin."""
 
     def __init__(self, file: Path, settings: Settings) -> None:
@@ -56,7 +56,7 @@ class Plan:
         drawn: dict[str, Any] = json.loads(as_geojson(document, area.name))
         return drawn
 
-    def save(self, drawn: Drawing) -> dict[str, Any]:
+    def save(self, drawn: DrawnFeatures) -> dict[str, Any]:
         """Write what was drawn, once it is a search that could be flown; raises BadInput and leaves the file alone."""
         text = json.dumps(drawn.model_dump(), indent=1)
         try:
@@ -82,7 +82,7 @@ class Plan:
 
 
 def create_plan_app(
-    plan: Plan,
+    plan: AreaPlan,
     *,
     access: Access | None = None,
     names: Sequence[str] = (),
@@ -129,7 +129,7 @@ def create_plan_app(
         return {"written": written((lat, lon), plan.settings.run.coordinates)}
 
     @app.post("/api/plan")
-    async def save(drawn: Annotated[Drawing, Body()]) -> dict[str, Any]:
+    async def save(drawn: Annotated[DrawnFeatures, Body()]) -> dict[str, Any]:
         return await asyncio.to_thread(plan.save, drawn)
 
     @app.post("/api/plan/start")
@@ -156,5 +156,5 @@ def create_plan_app(
             FOLDER / "plan.html", headers={"content-security-policy": policy(underlay.source)}
         )
 
-    app.mount("/page", Parts(directory=FOLDER))
+    app.mount("/page", PageFiles(directory=FOLDER))
     return app

@@ -19,7 +19,7 @@ class Unanswered(Exception):
     """The flight does not answer: it stands still, or it is ending. What was asked may or may not have been done."""
 
 
-class Sight(Protocol):
+class ShownMoment(Protocol):
     """A run at one time."""
 
     async def state(self) -> RunState:
@@ -51,7 +51,7 @@ class Sight(Protocol):
         ...
 
 
-class Run(Sight, Protocol):
+class ShownRun(ShownMoment, Protocol):
     """A run as the door needs it."""
 
     def scene(self) -> dict[str, Any]:
@@ -101,13 +101,13 @@ class Run(Sight, Protocol):
         ...
 
 
-class PastRun(Run, Protocol):
+class PastRun(ShownRun, Protocol):
     """A run that is over, at any of its times."""
 
     def span(self) -> tuple[float, float]:
         """Its first and last time, seconds since the epoch."""
         ...
 
-    def at(self, time: float) -> Sight:
+    def at(self, time: float) -> ShownMoment:
         """The run as it was at a time."""
         ...

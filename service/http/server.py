@@ -20,7 +20,7 @@ from service.http.access import Access, read_access
 from service.http.address import bind, bound_address, split_address, url_of
 from service.http.app import create_app
 from service.http.crowd import Crowd
-from service.http.run import PastRun, Run
+from service.http.run import PastRun, ShownRun
 from service.view.underlay import NO_UNDERLAY, Underlay, open_underlay
 
 _MOST_HEADER_BYTES = 16_384
@@ -57,7 +57,7 @@ class Door:
         access, token = self.access.with_guest()
         return replace(self, access=access), token
 
-    def server(self, run: Run, past: PastRun | None = None) -> Server:
+    def server(self, run: ShownRun, past: PastRun | None = None) -> Server:
         """A server of a run at this door; for `past` see `create_app`."""
         return self.serving(lambda **known: create_app(run, http=self.http, past=past, **known))
 

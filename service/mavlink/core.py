@@ -44,7 +44,7 @@ from service.mavlink.events import (
 )
 from service.mavlink.framing import Message, own_heartbeat
 from service.mavlink.modes import mode_title
-from service.mavlink.state import LinkState, speaks_as
+from service.mavlink.state import LinkMemory, speaks_as
 from service.mavlink.streams import Streams, streams_of
 from service.mavlink.target import Step
 from service.mavlink.telemetry import after_reboot, heartbeat, stopping_point
@@ -57,8 +57,8 @@ _STOP_ARRIVES_S = 10.0
 """So long a stop may be on its way over a bad radio."""
 
 
-class LinkCore(LinkState):
-    """One link to one vehicle: see `state.LinkState` for its arguments and for what it remembers."""
+class LinkCore(LinkMemory):
+    """One link to one vehicle: see `state.LinkMemory` for its arguments and for what it remembers."""
 
     # ---- what the owner calls
 

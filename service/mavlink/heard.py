@@ -15,10 +15,10 @@ from typing import Any
 
 from service.mavlink.batteries import Battery, together
 from service.mavlink.framing import Message
-from service.mavlink.heights import Heights
+from service.mavlink.heights import ToldAltitudes
 from service.mavlink.landing import Landing
 from service.mavlink.readers import READERS
-from service.mavlink.sentinels import Known
+from service.mavlink.sentinels import KnownFields
 from service.mavlink.settings import MavlinkSettings
 from service.mavlink.sources import SOURCES
 from service.mavlink.telemetry import Gps, Telemetry
@@ -56,7 +56,7 @@ class Heard:
         self._times: dict[str, float] = {}
         self._fields: dict[str, Any] = {}  # of Telemetry, as far as messages that are not old tell them
         self._landing = Landing()
-        self._heights = Heights()
+        self._heights = ToldAltitudes()
         self._old: frozenset[str] = frozenset()
         self._sorted_until = -math.inf  # nothing becomes old before
         self._seen: Telemetry | None = None
@@ -92,7 +92,7 @@ class Heard:
         or has the stamp of the one before."""
         name = message.get_type()
         reader = READERS.get(name)
-        fields = None if reader is None else reader(Known(message))
+        fields = None if reader is None else reader(KnownFields(message))
         if fields is None:
             return False
         battery = fields.get("battery")

@@ -21,7 +21,7 @@ class _Altitudes:
     time: float
 
 
-class Heights:
+class ToldAltitudes:
     """The two altitudes of one vehicle, as they were told last."""
 
     def __init__(self) -> None:

@@ -14,11 +14,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.mavlink.batteries import Battery
 from service.mavlink.events import Home, Target
-from service.mavlink.sentinels import Known
+from service.mavlink.sentinels import KnownFields
 from service.mavlink.telemetry import Gps, Wind, valid_place
 
 Fields = Mapping[str, object]
-Reader = Callable[[Known], Fields | None]
+Reader = Callable[[KnownFields], Fields | None]
 
 _LANDED = {1: "on_ground", 2: "in_air", 3: "takeoff", 4: "landing"}
 _DEGREES_E7 = 1e7
@@ -47,7 +47,7 @@ _STICK_CHANNELS = ("chan1_raw", "chan2_raw", "chan4_raw")  # roll, pitch, yaw as
 _MID_US, _HALF_TRAVEL_US = 1500.0, 500.0
 
 
-def _global_position(m: Known) -> Fields | None:
+def _global_position(m: KnownFields) -> Fields | None:
     lat, lon = m.read("lat", _DEGREES_E7), m.read("lon", _DEGREES_E7)
     alt, above_home = m.read("alt", 1e3), m.read("relative_alt", 1e3)
     if lat is None or lon is None or alt is None or above_home is None or not valid_place(lat, lon):
@@ -64,7 +64,7 @@ def _global_position(m: Known) -> Fields | None:
     }
 
 
-def _attitude(m: Known) -> Fields | None:
+def _attitude(m: KnownFields) -> Fields | None:
     roll, pitch, yaw = m.read("roll"), m.read("pitch"), m.read("yaw")
     if roll is None or pitch is None or yaw is None:
         return None
@@ -75,7 +75,7 @@ def _attitude(m: Known) -> Fields | None:
     }
 
 
-def _sys_status(m: Known) -> Fields:
+def _sys_status(m: KnownFields) -> Fields:
     health = m.flags("onboard_control_sensors_health")
     failed = m.flags("onboard_control_sensors_enabled") & ~health
     percent = m.read("battery_remaining")
@@ -90,7 +90,7 @@ def _sys_status(m: Known) -> Fields:
     }
 
 
-def _battery_status(m: Known) -> Fields:
+def _battery_status(m: KnownFields) -> Fields:
     cells = [*m.each("voltages", 1e3), *m.each("voltages_ext", 1e3)]
     return {
         "battery": Battery(
@@ -104,7 +104,7 @@ def _battery_status(m: Known) -> Fields:
     }
 
 
-def _gps(m: Known) -> Fields:
+def _gps(m: KnownFields) -> Fields:
     satellites = m.read("satellites_visible")
     return {
         "gps": Gps(
@@ -116,11 +116,11 @@ def _gps(m: Known) -> Fields:
     }
 
 
-def _extended_state(m: Known) -> Fields:
+def _extended_state(m: KnownFields) -> Fields:
     return {"landed_state": _LANDED.get(int(m.read("landed_state") or 0), "undefined")}
 
 
-def _place(m: Known) -> Home | None:
+def _place(m: KnownFields) -> Home | None:
     lat, lon = m.read("latitude", _DEGREES_E7), m.read("longitude", _DEGREES_E7)
     alt = m.read("altitude", 1e3)
     if lat is None or lon is None or alt is None or not valid_place(lat, lon):
@@ -128,22 +128,22 @@ def _place(m: Known) -> Home | None:
     return Home(lat, lon, alt)
 
 
-def _home(m: Known) -> Fields | None:
+def _home(m: KnownFields) -> Fields | None:
     home = _place(m)
     return None if home is None else {"home": home}
 
 
-def _origin(m: Known) -> Fields | None:
+def _origin(m: KnownFields) -> Fields | None:
     origin = _place(m)
     return None if origin is None else {"origin": origin}
 
 
-def _wind_cov(m: Known) -> Fields:
+def _wind_cov(m: KnownFields) -> Fields:
     north, east = m.read("wind_x"), m.read("wind_y")
     return {"wind": None if north is None or east is None else Wind(north, east)}
 
 
-def _wind(m: Known) -> Fields:
+def _wind(m: KnownFields) -> Fields:
     """ArduPilot's WIND says where the wind comes from."""
     direction, speed = m.read("direction"), m.read("speed")
     if direction is None or speed is None:
@@ -152,12 +152,12 @@ def _wind(m: Known) -> Fields:
     return {"wind": Wind(speed * math.cos(towards), speed * math.sin(towards))}
 
 
-def _estimator_status(m: Known) -> Fields:
+def _estimator_status(m: KnownFields) -> Fields:
     flags = m.flags("flags")
     return {"estimator_ok": _estimates_position(flags) and not flags & mavlink.ESTIMATOR_GPS_GLITCH}
 
 
-def _ekf_status(m: Known) -> Fields:
+def _ekf_status(m: KnownFields) -> Fields:
     """The lower bits are those of ESTIMATOR_STATUS, the faults are not."""
     flags = m.flags("flags")
     return {"estimator_ok": _estimates_position(flags) and not flags & _EKF_FAULTS}
@@ -167,7 +167,7 @@ def _estimates_position(flags: int) -> bool:
     return bool(flags & _ESTIMATOR_NEEDS == _ESTIMATOR_NEEDS)
 
 
-def _position_target(m: Known) -> Fields:
+def _position_target(m: KnownFields) -> Fields:
     lat, lon, alt = m.read("lat_int", _DEGREES_E7), m.read("lon_int", _DEGREES_E7), m.read("alt")
     if lat is None or lon is None or alt is None or not valid_place(lat, lon):
         return {"target": None}
@@ -176,14 +176,14 @@ def _position_target(m: Known) -> Fields:
     return {"target": Target(lat, lon, alt), "target_over_home": m.flags("coordinate_frame") in _OVER_HOME}
 
 
-def _rc_channels(m: Known) -> Fields:
+def _rc_channels(m: KnownFields) -> Fields:
     """How far the roll, pitch and yaw sticks are from the middle; the throttle has none on many transmitters."""
     channels = [m.read(name) for name in _STICK_CHANNELS] if m.flags("chancount") else []
     far = [abs(us - _MID_US) / _HALF_TRAVEL_US for us in channels if us is not None]
     return {"sticks": max(far, default=None)}
 
 
-def _distance_sensor(m: Known) -> Fields | None:
+def _distance_sensor(m: KnownFields) -> Fields | None:
     """One that looks down; in range, and with a signal (a quality of 1 is none)."""
     if m.flags("orientation") != mavlink.MAV_SENSOR_ROTATION_PITCH_270:
         return None
@@ -193,12 +193,12 @@ def _distance_sensor(m: Known) -> Fields | None:
     return {"ground_distance_m": there if nearest <= there <= farthest else None}
 
 
-def _terrain_report(m: Known) -> Fields:
+def _terrain_report(m: KnownFields) -> Fields:
     """A spacing of 0 says that the autopilot has no heights of the ground here."""
     return {"terrain_distance_m": None if m.read("spacing") is None else m.read("current_height")}
 
 
-def _manual_control(m: Known) -> Fields:
+def _manual_control(m: KnownFields) -> Fields:
     sticks = [m.read(name, 1e3) for name in ("x", "y", "r")]
     return {"sticks": max((abs(stick) for stick in sticks if stick is not None), default=None)}
 

@@ -22,7 +22,7 @@ UINT8_MAX, UINT16_MAX, UINT32_MAX = 2**8 - 1, 2**16 - 1, 2**32 - 1
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class FieldRule:
     """When a field is known: it is none of `unknown`, and between `low` and `high`."""
 
     unknown: tuple[float, ...] = ()
@@ -34,25 +34,25 @@ class Rule:
         return math.isfinite(value) and value not in self.unknown and self.low <= value <= self.high
 
 
-_FLAGS = Rule()
-_LATITUDE, _LONGITUDE = Rule((INT32_MAX,), -90e7, 90e7), Rule((INT32_MAX,), -180e7, 180e7)
-_ALTITUDE_MM = Rule((INT32_MAX,), -12e6, 100e6)  # the lowest ground and the highest air
-_SPEED_CMPS = Rule((INT16_MAX,), -INT16_MAX, INT16_MAX)
-_ANGLE = Rule((), -7.0, 7.0)
-_PERCENT = Rule((-1,), 0, 100)
-_CURRENT = Rule((-1, INT16_MAX), 0)  # PX4 says -100 for 'not measured'
+_FLAGS = FieldRule()
+_LATITUDE, _LONGITUDE = FieldRule((INT32_MAX,), -90e7, 90e7), FieldRule((INT32_MAX,), -180e7, 180e7)
+_ALTITUDE_MM = FieldRule((INT32_MAX,), -12e6, 100e6)  # the lowest ground and the highest air
+_SPEED_CMPS = FieldRule((INT16_MAX,), -INT16_MAX, INT16_MAX)
+_ANGLE = FieldRule((), -7.0, 7.0)
+_PERCENT = FieldRule((-1,), 0, 100)
+_CURRENT = FieldRule((-1, INT16_MAX), 0)  # PX4 says -100 for 'not measured'
 _GPS = {
-    "fix_type": Rule((), 0, 8),
-    "eph": Rule((UINT16_MAX,)),
-    "satellites_visible": Rule((UINT8_MAX,)),
-    "h_acc": Rule((0, UINT32_MAX)),
+    "fix_type": FieldRule((), 0, 8),
+    "eph": FieldRule((UINT16_MAX,)),
+    "satellites_visible": FieldRule((UINT8_MAX,)),
+    "h_acc": FieldRule((0, UINT32_MAX)),
 }
 _PLACE = {"latitude": _LATITUDE, "longitude": _LONGITUDE, "altitude": _ALTITUDE_MM}
-_STICK = Rule((INT16_MAX,), -1000, 1000)
-_RANGE_CM = Rule((UINT16_MAX,), 0)
-_CHANNEL = Rule((0, UINT16_MAX), 500, 2500)
+_STICK = FieldRule((INT16_MAX,), -1000, 1000)
+_RANGE_CM = FieldRule((UINT16_MAX,), 0)
+_CHANNEL = FieldRule((0, UINT16_MAX), 500, 2500)
 
-FIELDS: Mapping[str, Mapping[str, Rule]] = {
+FIELDS: Mapping[str, Mapping[str, FieldRule]] = {
     "GLOBAL_POSITION_INT": {
         "lat": _LATITUDE,
         "lon": _LONGITUDE,
@@ -61,32 +61,35 @@ FIELDS: Mapping[str, Mapping[str, Rule]] = {
         "vx": _SPEED_CMPS,
         "vy": _SPEED_CMPS,
         "vz": _SPEED_CMPS,
-        "hdg": Rule((UINT16_MAX,), 0, 36_000),
+        "hdg": FieldRule((UINT16_MAX,), 0, 36_000),
     },
     "ATTITUDE": {"roll": _ANGLE, "pitch": _ANGLE, "yaw": _ANGLE},
     "SYS_STATUS": {
         "onboard_control_sensors_enabled": _FLAGS,
         "onboard_control_sensors_health": _FLAGS,
-        "voltage_battery": Rule((0, UINT16_MAX)),
+        "voltage_battery": FieldRule((0, UINT16_MAX)),
         "current_battery": _CURRENT,
         "battery_remaining": _PERCENT,
     },
     "BATTERY_STATUS": {
         "id": _FLAGS,
-        "voltages": Rule((0, UINT16_MAX)),
-        "voltages_ext": Rule((0, UINT16_MAX)),
+        "voltages": FieldRule((0, UINT16_MAX)),
+        "voltages_ext": FieldRule((0, UINT16_MAX)),
         "current_battery": _CURRENT,
-        "current_consumed": Rule((-1, INT32_MAX), 0),
+        "current_consumed": FieldRule((-1, INT32_MAX), 0),
         "battery_remaining": _PERCENT,
-        "charge_state": Rule((0,), 1, 7),
+        "charge_state": FieldRule((0,), 1, 7),
     },
     "GPS_RAW_INT": _GPS,
     "GPS2_RAW": _GPS,
-    "EXTENDED_SYS_STATE": {"landed_state": Rule((0,), 1, 4)},
+    "EXTENDED_SYS_STATE": {"landed_state": FieldRule((0,), 1, 4)},
     "HOME_POSITION": _PLACE,
     "GPS_GLOBAL_ORIGIN": _PLACE,
-    "WIND_COV": {"wind_x": Rule(), "wind_y": Rule()},
-    "WIND": {"direction": Rule(), "speed": Rule((0,), 0)},  # an estimator without a wind says exactly 0
+    "WIND_COV": {"wind_x": FieldRule(), "wind_y": FieldRule()},
+    "WIND": {
+        "direction": FieldRule(),
+        "speed": FieldRule((0,), 0),
+    },  # an estimator without a wind says exactly 0
     "ESTIMATOR_STATUS": {"flags": _FLAGS},
     "EKF_STATUS_REPORT": {"flags": _FLAGS},
     "POSITION_TARGET_GLOBAL_INT": {
@@ -94,22 +97,25 @@ FIELDS: Mapping[str, Mapping[str, Rule]] = {
         "type_mask": _FLAGS,
         "lat_int": _LATITUDE,
         "lon_int": _LONGITUDE,
-        "alt": Rule(),
+        "alt": FieldRule(),
     },
     "DISTANCE_SENSOR": {
         "min_distance": _RANGE_CM,
         "max_distance": _RANGE_CM,
         "current_distance": _RANGE_CM,
         "orientation": _FLAGS,
-        "signal_quality": Rule((0,), 0, 100),
+        "signal_quality": FieldRule((0,), 0, 100),
     },
-    "TERRAIN_REPORT": {"spacing": Rule((0, UINT16_MAX), 0), "current_height": Rule((), -12e3, 100e3)},
+    "TERRAIN_REPORT": {
+        "spacing": FieldRule((0, UINT16_MAX), 0),
+        "current_height": FieldRule((), -12e3, 100e3),
+    },
     "MANUAL_CONTROL": {"x": _STICK, "y": _STICK, "r": _STICK},
     "RC_CHANNELS": {"chancount": _FLAGS, **{f"chan{i}_raw": _CHANNEL for i in (1, 2, 4)}},
 }
 
 
-class Known:
+class KnownFields:
     """A message of which only the fields of the table can be read, and what is unknown is None.
 
     An array gives the list of its known elements.

@@ -45,7 +45,7 @@ _BEFORE_PAIRING_SYSTEM = 1
 _TEXT_MEMORY_S = 10.0
 
 
-class LinkState:
+class LinkMemory:
     """The state of one link, and its way out. `core.LinkCore` says what follows from what.
 
     Args:
@@ -112,7 +112,7 @@ class LinkState:
         self._told_of: set[tuple[int, str]] = set()
         """Autopilots that were heard in the place of ours, while it was silent."""
 
-    def _go_on_from(self, before: LinkState) -> None:
+    def _go_on_from(self, before: LinkMemory) -> None:
         """What is ours and not a vehicle's goes on: our clock, the numbers of commands and of texts, what was said."""
         self._now, self._stalled_at = before._now, before._stalled_at
         self._book.number_after(before._book)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from service.config import SPARE_M, Settings
 from service.evidence.mask import looks_count
 from service.geometry import LatLon, Metres, moved
-from service.ground.leg import Profile, highest_above, least_clearance, passing, profile
+from service.ground.leg import GroundProfile, highest_above, least_clearance, passing, profile
 from service.mavlink.telemetry import Telemetry
 from service.mission.chart import Chart, here
 from service.mission.fence import height_objection
@@ -383,12 +383,12 @@ class Heights:
         speed = self._flight.speed_mps
         return speed**2 / (2.0 * self._flight.deceleration_mps2) + speed * _REACTION_S
 
-    def _profile(self, start: LatLon, end: LatLon) -> Profile:
+    def _profile(self, start: LatLon, end: LatLon) -> GroundProfile:
         assert self.relief is not None
         metres = self._chart.metres
         return profile(self.relief, metres(start), metres(end), ahead_m=self._ahead_m)
 
-    def _height_of(self, seen: Profile, highest: float) -> float:
+    def _height_of(self, seen: GroundProfile, highest: float) -> float:
         """The height to fly a leg at: above the ground at its end as the search is, clear of all of it."""
         flight, end = self._flight, float(seen.ground[-1])
         wanted = end + flight.altitude_m if math.isfinite(end) else math.inf
@@ -403,7 +403,7 @@ class Heights:
         seconds = speed / (2.0 * self._flight.deceleration_mps2) + _REACTION_S
         return moved(here(t), seconds * east, seconds * north)
 
-    def _coasting(self, t: Telemetry) -> Profile:
+    def _coasting(self, t: Telemetry) -> GroundProfile:
         """The ground below until the aircraft stands, whatever it is told."""
         assert self.relief is not None
         metres = self._chart.metres

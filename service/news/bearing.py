@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from service.area.frame import GridFrame
 from service.area.prior import cell_squares, covered_fraction
 
-Role = Literal["clue", "searched", "exclude"]
+NewsRole = Literal["clue", "searched", "exclude"]
 _NOTHING = 1e-6  # a factor so near to 1, or a POD so near to 0, is none
 
 
@@ -34,7 +34,7 @@ class FieldNews:
     """
 
     id: str
-    role: Role
+    role: NewsRole
     words: str
     place: tuple[float, float]
     cells: NDArray[np.int64]

@@ -6,7 +6,7 @@ keep only its own queue waiting; the flight does not know that it exists. What i
 restart of that process, so that a receiver can drop what it knows already.
 """
 
-from service.telling.settings import Plan, read_plan
+from service.telling.settings import TellingPlan, read_plan
 from service.telling.telling import Telling
 
-__all__ = ["Plan", "Telling", "read_plan"]
+__all__ = ["Telling", "TellingPlan", "read_plan"]

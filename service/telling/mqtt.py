@@ -21,7 +21,7 @@ from typing import Any
 
 from service.cancelling import end_if_cancelled
 from service.doors.mqtt import RETRY_S, Broker
-from service.telling.news import News
+from service.telling.news import Announcement
 from service.view.state import PoseState, RunState
 
 log = logging.getLogger("roisearch")
@@ -42,7 +42,7 @@ class StateTopics:
         self._more, self._quiet = asyncio.Event(), asyncio.Event()
         self._quiet.set()
 
-    def tell(self, state: RunState, news: list[News]) -> None:
+    def tell(self, state: RunState, news: list[Announcement]) -> None:
         """Take a state in, and the news in it."""
         for topic, value in topics(state).items():
             text = json.dumps(value, ensure_ascii=False)

@@ -11,7 +11,7 @@ from service.chances import sure
 from service.geometry import LatLon, distance_m
 from service.view.state import RunState
 
-Kind = Literal["suspect", "found", "withdrawn"]
+AnnouncementKind = Literal["suspect", "found", "withdrawn"]
 
 SAME_M = 30.0
 """A suspect nearer than this to one that was told is that one: evidence moves it a little."""
@@ -20,7 +20,7 @@ MOST_SUSPECTS = 200
 
 
 @dataclass(frozen=True)
-class News:
+class Announcement:
     """Something to tell at once.
 
     Attributes:
@@ -33,7 +33,7 @@ class News:
     """
 
     id: str
-    kind: Kind
+    kind: AnnouncementKind
     time: float
     run: str
     area: str
@@ -76,9 +76,9 @@ class Newsdesk:
         self._found: LatLon | None = None
         self._found_written = ""
 
-    def news(self, state: RunState, time: float) -> list[News]:
+    def news(self, state: RunState, time: float) -> list[Announcement]:
         """What has to be told now; each thing once."""
-        told: list[News] = []
+        told: list[Announcement] = []
         found = state["found"]
         if found is not None:
             place = (found["lat"], found["lon"])
@@ -108,11 +108,11 @@ class Newsdesk:
                 )
         return told
 
-    def _new(self, kind: Kind, state: RunState, *rest: Any) -> News:
+    def _new(self, kind: AnnouncementKind, state: RunState, *rest: Any) -> Announcement:
         time, place, written, probability, within, text = rest
         name = f"{self._run}-{kind}-{place[0]:.4f},{place[1]:.4f}"
         text = f"{state['area']}: {text}"
-        return News(
+        return Announcement(
             name,
             kind,
             time,

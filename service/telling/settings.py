@@ -62,7 +62,7 @@ class Tak:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TellingPlan:
     """Whom a run tells; nobody, by default."""
 
     run: str = ""
@@ -76,7 +76,7 @@ class Plan:
         return not (self.hook is None and self.mqtt is None and self.tak is None)
 
 
-def read_plan(settings: TellingSettings) -> Plan:
+def read_plan(settings: TellingSettings) -> TellingPlan:
     """Whom the settings name. Raises BadInput when an address is none, or a file cannot be read."""
     hook = tak = mqtt = None
     if settings.webhook:
@@ -87,7 +87,7 @@ def read_plan(settings: TellingSettings) -> Plan:
         )
     if settings.tak:
         tak = _tak(settings)
-    return Plan(hook=hook, mqtt=mqtt, tak=tak)
+    return TellingPlan(hook=hook, mqtt=mqtt, tak=tak)
 
 
 def _hook(url: str, token_file: str) -> Hook:

@@ -13,7 +13,7 @@ from service.http.run import Unanswered
 from service.telling.mqtt import StateTopics
 from service.telling.news import Newsdesk
 from service.telling.searched import Outline
-from service.telling.settings import Plan
+from service.telling.settings import TellingPlan
 from service.telling.tak import TakTeller
 from service.telling.webhook import Webhook
 from service.view.state import RunState
@@ -27,7 +27,7 @@ GOODBYE_S = 6.0
 class Telling:
     """Asks for the state twice a second, and tells what is new. Nothing in here waits for a receiver."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: TellingPlan) -> None:
         self.plan = plan
         self._watch = Newsdesk(plan.run)
         self._hook = None if plan.hook is None else Webhook(plan.hook)

@@ -7,7 +7,7 @@ import logging
 
 import httpx
 
-from service.telling.news import News
+from service.telling.news import Announcement
 from service.telling.settings import Hook
 
 log = logging.getLogger("roisearch")
@@ -24,9 +24,9 @@ class Webhook:
 
     def __init__(self, hook: Hook, *, first_pause_s: float = FIRST_PAUSE_S) -> None:
         self._hook, self._first_pause_s = hook, first_pause_s
-        self._waiting: asyncio.Queue[News] = asyncio.Queue(MOST_WAITING)
+        self._waiting: asyncio.Queue[Announcement] = asyncio.Queue(MOST_WAITING)
 
-    def tell(self, news: News) -> None:
+    def tell(self, news: Announcement) -> None:
         """Take news in; what is too much is dropped, and said."""
         try:
             self._waiting.put_nowait(news)
@@ -48,7 +48,7 @@ class Webhook:
                 finally:
                     self._waiting.task_done()
 
-    async def _post(self, client: httpx.AsyncClient, news: News) -> None:
+    async def _post(self, client: httpx.AsyncClient, news: Announcement) -> None:
         pause_s, said = self._first_pause_s, ""
         while True:
             try:
@@ -69,7 +69,7 @@ class Webhook:
             await asyncio.sleep(pause_s)
             pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
 
-    async def _once(self, client: httpx.AsyncClient, news: News) -> int:
+    async def _once(self, client: httpx.AsyncClient, news: Announcement) -> int:
         headers = {"Idempotency-Key": news.id}
         async with client.stream("POST", self._hook.url, json=news.body(), headers=headers) as answer:
             read = 0

@@ -25,7 +25,7 @@ from service.search import Search
 from service.view.feed import Moment
 from service.view.maps import draw_map
 from service.view.next import ChoiceState, NextState, choices, next_state
-from service.view.scene import Ground
+from service.view.scene import SearchGround
 from service.view.state import (
     DrawnState,
     FootprintCell,
@@ -54,11 +54,11 @@ class BaseView:
         }
         how = settings.run.coordinates
         drawing = search.drawing
-        self.ground = Ground.of(area, search.grid, drawing.labels, settings.search.planner, how)
+        self.ground = SearchGround.of(area, search.grid, drawing.labels, settings.search.planner, how)
         """The ground with the regions as they were drawn when this view was made."""
         self._ground = self.ground
 
-    def ground_now(self) -> Ground:
+    def ground_now(self) -> SearchGround:
         """The ground with the regions as they are drawn now; where they are other ones it outlines them, which takes
         long on a large map."""
         drawing = self.search.drawing

@@ -59,7 +59,7 @@ class Forecast:
         return {"goals": goals, "reachable": self.reachable, "basis": self.basis.format(planner=self.planner)}
 
 
-class Searcher(NamedTuple):
+class SearchingAircraft(NamedTuple):
     """Who searches: the search as it has it, and the cell and heading that it has."""
 
     search: Search
@@ -79,7 +79,7 @@ class Estimator:
         self._of: tuple[float, int, tuple[str, ...]] | None = None
         self._at = -LEAST_PAUSE_S
 
-    def latest(self, crew: Sequence[Searcher], flown: float) -> Forecast | None:
+    def latest(self, crew: Sequence[SearchingAircraft], flown: float) -> Forecast | None:
         """The last forecast; a new one is begun when the search has gone on since, or others fly it."""
         if self._running is not None and self._running.done():
             self._last, self._running = self._running.result(), None
@@ -95,11 +95,13 @@ class Estimator:
         return self._last
 
 
-def _state(of: Searcher) -> SearchState:
+def _state(of: SearchingAircraft) -> SearchState:
     return SearchState(cell=of.search.grid.nearest_flyable(of.cell), heading=of.heading)
 
 
-def _of_one(crew: list[Searcher], belief: Belief, left: Floats, pos: float, flown: float) -> Forecast:
+def _of_one(
+    crew: list[SearchingAircraft], belief: Belief, left: Floats, pos: float, flown: float
+) -> Forecast:
     search, state, thinking = crew[0].search, _state(crew[0]), crew[0].search.foreseeing()
     reachable = pos + float(left[search.grid.flyable].sum())
     course = expected_pos(
@@ -118,7 +120,9 @@ def _of_one(crew: list[Searcher], belief: Belief, left: Floats, pos: float, flow
     return Forecast(pos, flown, reachable, course.gained, seconds, thinking.planner.name, basis, names)
 
 
-def _of_several(crew: list[Searcher], belief: Belief, left: Floats, pos: float, flown: float) -> Forecast:
+def _of_several(
+    crew: list[SearchingAircraft], belief: Belief, left: Floats, pos: float, flown: float
+) -> Forecast:
     thinking = [each.search.foreseeing() for each in crew]
     flyers = [
         Flyer(

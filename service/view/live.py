@@ -30,7 +30,7 @@ from service.search import Search
 from service.squad import Squad
 from service.view.base import BaseView, news_states, sortie_states
 from service.view.curve import PosCurve
-from service.view.estimate import Estimator, Searcher
+from service.view.estimate import Estimator, SearchingAircraft
 from service.view.feed import Moment
 from service.view.next import STATE_WORDS
 from service.view.state import (
@@ -339,7 +339,7 @@ class RunView(BaseView):
             return None
         since = self.clock.now() if self.squad.several else flown  # no flight of theirs is that of all
         forecast = self.estimator.latest(
-            [Searcher(each.search, each.cell(), each.heading()) for each in crew], since
+            [SearchingAircraft(each.search, each.cell(), each.heading()) for each in crew], since
         )
         return None if forecast is None else forecast.to_goals(self.search.record.pos, since)
 

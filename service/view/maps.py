@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from service.chances import share, sure
 from service.view.feed import Moment
-from service.view.scene import Ground
+from service.view.scene import SearchGround
 from service.view.shapes import area_features, cell_features, feature, line, point
 
 _CELLS_AT_ONCE = 500
 
 
-def map_text(ground: Ground, moment: Moment, digest: str) -> bytes:
+def map_text(ground: SearchGround, moment: Moment, digest: str) -> bytes:
     """The belief and the probability of detection, cell by cell (null where nothing is searched), as JSON.
 
     `digest` is the belief's, in the same moment.
@@ -40,7 +40,7 @@ def map_text(ground: Ground, moment: Moment, digest: str) -> bytes:
     return ("{" + ",".join(f'"{name}":{text}' for name, text in members.items()) + "}").encode()
 
 
-def geojson_text(ground: Ground, moment: Moment) -> bytes:
+def geojson_text(ground: SearchGround, moment: Moment) -> bytes:
     """The map for other programs (RFC 7946): area, regions with their mass, cells, track, hits, the place found."""
     state = moment.state
     members = {name: _said(state[name]) for name in ("pos", "outside", "time")}
@@ -49,7 +49,7 @@ def geojson_text(ground: Ground, moment: Moment) -> bytes:
     return f'{{"type":"FeatureCollection",{head},"features":[{features}]}}'.encode()
 
 
-def _features(ground: Ground, moment: Moment) -> Iterator[dict[str, Any]]:
+def _features(ground: SearchGround, moment: Moment) -> Iterator[dict[str, Any]]:
     state, grid = moment.state, ground.grid
     yield from area_features(ground.area, grid)
     for outline in ground.outlines:
@@ -67,7 +67,7 @@ def _features(ground: Ground, moment: Moment) -> Iterator[dict[str, Any]]:
         yield feature(point(found["lat"], found["lon"]), "found", probability=found["probability"])
 
 
-def draw_map(ground: Ground, moment: Moment) -> bytes:
+def draw_map(ground: SearchGround, moment: Moment) -> bytes:
     """The map as a PNG; it takes long, and may be left to another thread."""
     from service.view.picture import PictureScene, draw_scene  # matplotlib: it takes long to import, too
 
@@ -100,7 +100,7 @@ def _places(rows: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
     return [(row[0], row[1]) for row in rows]
 
 
-def _probability(ground: Ground, moment: Moment) -> NDArray[np.float64]:
+def _probability(ground: SearchGround, moment: Moment) -> NDArray[np.float64]:
     return np.asarray(moment.weights / moment.total).reshape(ground.grid.frame.shape)
 
 

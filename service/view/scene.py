@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class SearchGround:
     """Where a search takes place. It can be handed to another process: it knows neither belief nor planner.
 
     Attributes:
@@ -50,13 +50,13 @@ class Ground:
         labels: NDArray[np.integer[Any]],
         planner: str,
         coordinates: Coordinates = "degrees",
-    ) -> Ground:
+    ) -> SearchGround:
         """The ground with its regions outlined."""
         outlines = region_features(grid, labels)
         names = tuple(region_names(area, grid.frame, outlines))
         return cls(area, grid, labels, outlines, planner, names, coordinates)
 
-    def redrawn(self, drawing: Drawing) -> Ground:
+    def redrawn(self, drawing: Drawing) -> SearchGround:
         """The same ground with the regions of another drawing, outlined, which takes long on a large map."""
         outlines = region_features(self.grid, drawing.labels)
         return replace(

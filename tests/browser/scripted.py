@@ -20,7 +20,7 @@ from service.evidence.cover import sensors_over
 from service.evidence.reports import KEPT_AT, OrderReceipt
 from service.geometry import LatLon
 from service.http import Door, Server, open_door
-from service.http.plan import Plan, create_plan_app
+from service.http.plan import AreaPlan, create_plan_app
 from service.mission.states import State
 from service.reasons import Option
 from service.search import Search
@@ -173,7 +173,7 @@ class Board(Opened):
 
     def __init__(self, file: Path, coordinates: str = "degrees") -> None:
         self.file = file
-        plan = Plan(file, Settings.model_validate({"run": {"coordinates": coordinates}}))
+        plan = AreaPlan(file, Settings.model_validate({"run": {"coordinates": coordinates}}))
         super().__init__({}, lambda door: door.serving(lambda **known: create_plan_app(plan, **known)))
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from roisearch import Belief
 from service.area import build_grid
-from service.area.model import Target
+from service.area.model import TargetMotion
 from service.errors import BadInput
 from tests.service.area.files import at, box, collection, feature, parse, point, polygon
 
@@ -26,7 +26,7 @@ def test_a_target_stands_still_unless_the_file_says_that_it_walks() -> None:
 
 def test_a_target_walks_as_the_file_says_on_the_cells_of_the_grid() -> None:
     area = area_with({"moves": "walks", "speed_mps": 0.4, "stops_per_hour": 0.3})
-    assert area.target == Target(0.4, 0.3)
+    assert area.target == TargetMotion(0.4, 0.3)
     grid = build_grid(area, 20.0)
     assert grid.walk is not None
     assert (grid.walk.speed_mps, grid.walk.stops_per_hour, grid.walk.cell_m) == (0.4, 0.3, 20.0)
@@ -45,7 +45,7 @@ def test_several_search_polygons_may_say_it_alike_and_not_differently() -> None:
         )
 
     walks, runs = {"moves": "walks", "speed_mps": 0.4}, {"moves": "walks", "speed_mps": 2.0}
-    assert two(walks, walks).target == two(walks, None).target == Target(0.4)
+    assert two(walks, walks).target == two(walks, None).target == TargetMotion(0.4)
     with pytest.raises(BadInput, match="give it once"):
         two(walks, runs)
 
@@ -86,4 +86,4 @@ def test_it_belongs_to_the_search_area() -> None:
 
 
 def test_it_may_be_zero_stops() -> None:
-    assert area_with({"moves": "walks", "speed_mps": 0.4, "stops_per_hour": 0}).target == Target(0.4)
+    assert area_with({"moves": "walks", "speed_mps": 0.4, "stops_per_hour": 0}).target == TargetMotion(0.4)

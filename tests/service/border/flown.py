@@ -24,19 +24,19 @@ from service.http import open_door
 from service.journal import Journal
 from service.news.bearing import FieldNews
 from service.news.request import NewsRequest
-from service.telling import Plan
+from service.telling import TellingPlan
 from service.view.feed import Moment
-from service.view.scene import Ground
+from service.view.scene import SearchGround
 from service.view.state import HeardState
 from tests.integration.flight import FIELD
 
 PATIENCE_S = 60.0
 
 
-def ground() -> Ground:
+def ground() -> SearchGround:
     """The field of the integration tests, in cells of 20 m."""
     grid = build_grid(parse_area(json.dumps(FIELD).encode(), source="field"), 20.0)
-    return Ground.of(
+    return SearchGround.of(
         parse_area(json.dumps(FIELD).encode(), source="field"),
         grid,
         np.where(grid.searchable, 1, 0),
@@ -120,7 +120,11 @@ class Flown:
 
 @asynccontextmanager
 async def behind_a_door(
-    run: Flown, folder: Path, doors: dict[str, str] | None = None, telling: Plan | None = None, **http: Any
+    run: Flown,
+    folder: Path,
+    doors: dict[str, str] | None = None,
+    telling: TellingPlan | None = None,
+    **http: Any,
 ) -> AsyncIterator[httpx.AsyncClient]:
     """A client of a run's real door process."""
     _EARLIER.clear()
@@ -132,7 +136,7 @@ async def behind_a_door(
         contextlib.closing(open_doors(DoorSettings.model_validate(doors or {}))) as others,
     ):
         async with (
-            serving(door, others, run, run.ground, folder / "journal.sqlite", telling or Plan()),
+            serving(door, others, run, run.ground, folder / "journal.sqlite", telling or TellingPlan()),
             httpx.AsyncClient(base_url=door.url, timeout=PATIENCE_S) as client,
         ):
             yield client

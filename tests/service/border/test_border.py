@@ -21,7 +21,7 @@ from websockets.asyncio.client import connect
 
 from service.border import keeper
 from service.journal import JournalLost
-from service.telling import Plan
+from service.telling import TellingPlan
 from service.telling.settings import Tak
 from service.view.feed import Moment
 
@@ -73,7 +73,10 @@ def test_a_tak_team_is_told_what_was_searched_by_the_door_process(tmp_path: Path
             inbox.bind(("127.0.0.1", 0))
             inbox.setblocking(False)
             tak = Tak("udp", "127.0.0.1", inbox.getsockname()[1], "Falcon")
-            async with behind_a_door(run, tmp_path, telling=Plan(tak=tak)), asyncio.timeout(PATIENCE_S):
+            async with (
+                behind_a_door(run, tmp_path, telling=TellingPlan(tak=tak)),
+                asyncio.timeout(PATIENCE_S),
+            ):
                 return ET.fromstring(await asyncio.get_running_loop().sock_recv(inbox, 9000))
 
     event = asyncio.run(talk())

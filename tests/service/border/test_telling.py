@@ -16,7 +16,7 @@ from service.config import DoorSettings, HttpSettings
 from service.doors import open_doors
 from service.http import open_door
 from service.journal import Journal
-from service.telling.settings import Hook, Plan
+from service.telling.settings import Hook, TellingPlan
 from tests.service.telling.seen import found, state, suspect
 from tests.service.telling.test_webhook import server, status
 
@@ -41,7 +41,7 @@ async def told(run: Seen, folder: Path, hook: Hook) -> Any:
         contextlib.closing(open_door(HttpSettings(listen="127.0.0.1:0"), {})) as door,
         contextlib.closing(open_doors(DoorSettings())) as doors,
     ):
-        async with serving(door, doors, run, run.ground, folder / "journal.sqlite", Plan(hook=hook)):
+        async with serving(door, doors, run, run.ground, folder / "journal.sqlite", TellingPlan(hook=hook)):
             yield door
 
 

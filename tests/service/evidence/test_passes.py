@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.evidence.passes import SILENT_S, Change, Look, Passes, as_likelihoods
+from service.evidence.passes import SILENT_S, CellLook, Change, Passes, as_likelihoods
 
 HERE, THERE = (3, 4), (3, 5)
 P_TN = 0.8
-MISS = Look(True, 0.9, P_TN)
-PARTLY = Look(False, 0.9, P_TN)
+MISS = CellLook(True, 0.9, P_TN)
+PARTLY = CellLook(False, 0.9, P_TN)
 
 
-def hit(ratio: float, counts: bool = True) -> Look:
-    return Look(counts, 0.9, P_TN, ratio)
+def hit(ratio: float, counts: bool = True) -> CellLook:
+    return CellLook(counts, 0.9, P_TN, ratio)
 
 
 def factor(changes: list[Change]) -> float:
@@ -36,9 +36,9 @@ def looks(changes: list[Change]) -> int:
 
 # ---- against a plain twin
 
-Frames = list[tuple[float, Look | None]]
+Frames = list[tuple[float, CellLook | None]]
 FRAME = st.none() | st.builds(
-    Look,
+    CellLook,
     counts=st.booleans(),
     p_tp=st.sampled_from([0.3, 0.6, 0.9]),
     p_tn=st.just(P_TN),

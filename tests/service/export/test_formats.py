@@ -35,7 +35,7 @@ from service.area import leg_is_clear, read_geotiff_prior
 from service.errors import BadInput
 from service.export.formats import FORMATS
 from service.export.gaps import gap_cells
-from service.export.model import Run
+from service.export.model import ExportedRun
 from service.export.run import read_run
 from service.export.wishes import Wishes
 from service.places import written
@@ -47,18 +47,18 @@ GEOD = pyproj.Geod(ellps="WGS84")
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def run(tmp_path_factory: pytest.TempPathFactory) -> ExportedRun:
     """A run that is over and has found nothing."""
     return read_run(record(tmp_path_factory.mktemp("run") / "searched"))
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def found(tmp_path_factory: pytest.TempPathFactory) -> ExportedRun:
     """A run that has found its target."""
     return read_run(record(tmp_path_factory.mktemp("run") / "found", found=True))
 
 
-def saved(run: Run, name: str, folder: Path) -> Path:
+def saved(run: ExportedRun, name: str, folder: Path) -> Path:
     """An export as a file."""
     path = folder / f"run{FORMATS[name].suffix}"
     path.write_bytes(FORMATS[name].write(run, WISHES))
@@ -73,7 +73,7 @@ def roles(path: Path) -> dict[str, list[dict[str, Any]]]:
     return found
 
 
-def test_geojson_is_read_by_gdal_with_everything_in_its_place(found: Run, tmp_path: Path) -> None:
+def test_geojson_is_read_by_gdal_with_everything_in_its_place(found: ExportedRun, tmp_path: Path) -> None:
     path = saved(found, "geojson", tmp_path)
     meta, _, geometries, columns = pyogrio.raw.read(path)
     role = columns[list(meta["fields"]).index("role")]
@@ -100,7 +100,9 @@ def test_geojson_is_read_by_gdal_with_everything_in_its_place(found: Run, tmp_pa
     assert area.symmetric_difference(found.area.polygon).area < 1e-3 * found.area.polygon.area
 
 
-def test_gap_polygons_hold_exactly_the_gap_cells_and_turn_as_rfc_7946_says(run: Run, tmp_path: Path) -> None:
+def test_gap_polygons_hold_exactly_the_gap_cells_and_turn_as_rfc_7946_says(
+    run: ExportedRun, tmp_path: Path
+) -> None:
     features = roles(saved(run, "geojson", tmp_path))["gap"]
     gaps = shapely.union_all([shapely.geometry.shape(feature["geometry"]) for feature in features])
     full = run.grid.covered > 0.999
@@ -112,7 +114,7 @@ def test_gap_polygons_hold_exactly_the_gap_cells_and_turn_as_rfc_7946_says(run: 
     assert {"poa", "pod", "area_m2", "cells", "flyable"} <= set(features[0]["properties"])
 
 
-def test_kml_is_valid_by_the_ogc_schema_and_read_by_gdal(found: Run, tmp_path: Path) -> None:
+def test_kml_is_valid_by_the_ogc_schema_and_read_by_gdal(found: ExportedRun, tmp_path: Path) -> None:
     path = saved(found, "kml", tmp_path)
     schema = etree.XMLSchema(etree.parse(Path(fastkml.validator.__file__).parent / "schema" / "ogckml22.xsd"))
     schema.assertValid(etree.parse(path))
@@ -126,7 +128,7 @@ def test_kml_is_valid_by_the_ogc_schema_and_read_by_gdal(found: Run, tmp_path: P
     assert len(shapely.get_coordinates(shapely.from_wkb(geometries))) == len(found.track[0])
 
 
-def test_gpx_keeps_to_its_schema_and_is_read_by_gpxpy(found: Run, tmp_path: Path) -> None:
+def test_gpx_keeps_to_its_schema_and_is_read_by_gpxpy(found: ExportedRun, tmp_path: Path) -> None:
     path = saved(found, "gpx", tmp_path)
     checked = gpx.validate(path)
     assert [str(issue) for issue in checked.issues] == []
@@ -141,7 +143,7 @@ def test_gpx_keeps_to_its_schema_and_is_read_by_gpxpy(found: Run, tmp_path: Path
     assert (kinds.count("launch"), kinds.count("hit"), kinds.count("found")) == (1, 1, 1)
 
 
-def test_descriptions_write_places_as_the_team_does(found: Run) -> None:
+def test_descriptions_write_places_as_the_team_does(found: ExportedRun) -> None:
     in_mgrs = found.settings.run.model_copy(update={"coordinates": "mgrs"})
     run = dataclasses.replace(found, settings=found.settings.model_copy(update={"run": in_mgrs}))
     assert run.find is not None
@@ -154,7 +156,7 @@ def test_descriptions_write_places_as_the_team_does(found: Run) -> None:
         assert place in FORMATS[name].write(run, WISHES).decode()
 
 
-def test_geotiff_is_placed_by_gdal_where_the_grid_is(run: Run, tmp_path: Path) -> None:
+def test_geotiff_is_placed_by_gdal_where_the_grid_is(run: ExportedRun, tmp_path: Path) -> None:
     path = saved(run, "geotiff", tmp_path)
     frame = run.frame
     assert abs(frame.bearing_deg) > 10.0  # a grid that is not turned would prove little
@@ -173,12 +175,12 @@ def test_geotiff_is_placed_by_gdal_where_the_grid_is(run: Run, tmp_path: Path) -
     assert np.abs(off).max() < 0.01
 
 
-def test_the_geotiff_of_a_run_is_the_prior_of_the_next(run: Run, tmp_path: Path) -> None:
+def test_the_geotiff_of_a_run_is_the_prior_of_the_next(run: ExportedRun, tmp_path: Path) -> None:
     prior = read_geotiff_prior(saved(run, "geotiff", tmp_path), run.frame, run.grid.searchable)
     assert prior == pytest.approx(run.poa / run.poa.sum(), abs=1e-6)
 
 
-def test_csv_is_a_table_that_no_spreadsheet_takes_for_formulas(run: Run, tmp_path: Path) -> None:
+def test_csv_is_a_table_that_no_spreadsheet_takes_for_formulas(run: ExportedRun, tmp_path: Path) -> None:
     text = saved(run, "csv", tmp_path).read_text(encoding="utf-8-sig")
     rows = list(csv.DictReader(io.StringIO(text)))
     assert [row["time_utc"] for row in rows] == sorted(row["time_utc"] for row in rows)
@@ -193,7 +195,7 @@ def test_csv_is_a_table_that_no_spreadsheet_takes_for_formulas(run: Run, tmp_pat
     assert FORMATS["csv"].write(run, WISHES).count(b"cmd|") == 2  # what the detector calls itself
 
 
-def test_html_is_whole_offline_and_harmless(run: Run, found: Run) -> None:
+def test_html_is_whole_offline_and_harmless(run: ExportedRun, found: ExportedRun) -> None:
     for each, words in ((run, "Not found."), (found, "Found")):
         data = FORMATS["html"].write(each, WISHES)
         page = html5lib.HTMLParser(strict=True, namespaceHTMLElements=False).parse(data.decode("utf-8"))
@@ -216,7 +218,7 @@ def test_html_is_whole_offline_and_harmless(run: Run, found: Run) -> None:
         assert "→ searching" in text
 
 
-def test_no_gap_is_never_said_beside_ground_that_was_not_searched(run: Run) -> None:
+def test_no_gap_is_never_said_beside_ground_that_was_not_searched(run: ExportedRun) -> None:
     """No cell has so much of the probability that it counts as a gap, and half of them have not been looked at."""
     text = FORMATS["html"].write(run, Wishes(poa_above=1000.0)).decode("utf-8")
     assert "There is no gap left" not in text
@@ -228,7 +230,7 @@ def test_no_gap_is_never_said_beside_ground_that_was_not_searched(run: Run) -> N
 
 
 def test_a_plan_is_loaded_and_uploaded_by_mavsdk_and_keeps_out_of_what_is_excluded(
-    run: Run, tmp_path: Path
+    run: ExportedRun, tmp_path: Path
 ) -> None:
     text = FORMATS["plan"].write(run, Wishes(minutes=12.0)).decode("utf-8")
 
@@ -260,7 +262,7 @@ def test_a_plan_is_loaded_and_uploaded_by_mavsdk_and_keeps_out_of_what_is_exclud
     assert mast.equals_exact(run.area.exclusions[0].polygon.geoms[0], 1e-7)
 
 
-def test_a_plan_goes_where_something_is_left_and_is_as_long_as_is_asked(run: Run) -> None:
+def test_a_plan_goes_where_something_is_left_and_is_as_long_as_is_asked(run: ExportedRun) -> None:
     lengths = []
     for minutes in (6.0, 12.0):
         plan = json.loads(FORMATS["plan"].write(run, Wishes(minutes=minutes)))
@@ -279,7 +281,7 @@ def test_a_plan_goes_where_something_is_left_and_is_as_long_as_is_asked(run: Run
     assert math.isclose(plan["mission"]["plannedHomePosition"][2], 500.0)
 
 
-def test_there_is_no_plan_after_a_find_or_for_no_time(run: Run, found: Run) -> None:
+def test_there_is_no_plan_after_a_find_or_for_no_time(run: ExportedRun, found: ExportedRun) -> None:
     with pytest.raises(BadInput, match="was found"):
         FORMATS["plan"].write(found, WISHES)
     with pytest.raises(BadInput, match="more --minutes"):

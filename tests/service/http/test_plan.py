@@ -15,7 +15,7 @@ from service.cli import main
 from service.config import Settings
 from service.errors import BadInput
 from service.http import Access
-from service.http.plan import Drawing, Plan, create_plan_app
+from service.http.plan import AreaPlan, DrawnFeatures, create_plan_app
 from tests.service.area.files import box, collection, feature, polygon
 
 from .door import TOKENS, bearer
@@ -24,7 +24,7 @@ FIELD = collection(feature(polygon(box(0, 0, 300, 200)), name="field"))
 
 
 def ask(
-    plan: Plan, method: str, path: str, body: Any = None, access: Access | None = None, **headers: str
+    plan: AreaPlan, method: str, path: str, body: Any = None, access: Access | None = None, **headers: str
 ) -> httpx.Response:
     """One request."""
 
@@ -37,7 +37,7 @@ def ask(
 
 
 def test_a_search_is_saved_and_then_started(tmp_path: Path) -> None:
-    plan = Plan(tmp_path / "area.geojson", Settings())
+    plan = AreaPlan(tmp_path / "area.geojson", Settings())
     assert ask(plan, "POST", "/api/plan/start", {}).status_code == 409
     assert not plan.started.is_set()
     assert ask(plan, "GET", "/api/plan").json()["drawn"] is None
@@ -53,7 +53,7 @@ def test_a_search_is_saved_and_then_started(tmp_path: Path) -> None:
 def test_what_is_no_search_leaves_the_file_alone_and_is_one_sentence_without_our_paths(
     tmp_path: Path,
 ) -> None:
-    plan = Plan(tmp_path / "area.geojson", Settings())
+    plan = AreaPlan(tmp_path / "area.geojson", Settings())
     plan.file.write_text(json.dumps(FIELD), encoding="utf-8")
     nothing = ask(plan, "POST", "/api/plan", {"type": "FeatureCollection", "features": []})
     assert nothing.status_code == 422
@@ -61,11 +61,13 @@ def test_what_is_no_search_leaves_the_file_alone_and_is_one_sentence_without_our
     assert ".plan-" not in nothing.json()["detail"]
     assert json.loads(plan.file.read_text(encoding="utf-8")) == FIELD
     with pytest.raises(BadInput, match="writable --out"):
-        Plan(tmp_path / "no" / "a.geojson", Settings()).save(Drawing.model_validate({**FIELD, "name": ""}))
+        AreaPlan(tmp_path / "no" / "a.geojson", Settings()).save(
+            DrawnFeatures.model_validate({**FIELD, "name": ""})
+        )
 
 
 def test_drawing_wants_the_command_token(tmp_path: Path) -> None:
-    plan = Plan(tmp_path / "area.geojson", Settings())
+    plan = AreaPlan(tmp_path / "area.geojson", Settings())
     assert ask(plan, "GET", "/api/plan", access=TOKENS).status_code == 401
     report = ask(plan, "POST", "/api/plan", FIELD, access=TOKENS, **bearer("report-token-0123456789"))
     assert report.status_code == 403

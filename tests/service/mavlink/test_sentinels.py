@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.mavlink.heard import Heard
 from service.mavlink.readers import READERS
-from service.mavlink.sentinels import FIELDS, Known
+from service.mavlink.sentinels import FIELDS, KnownFields
 from service.mavlink.settings import MavlinkSettings
 from service.mavlink.telemetry import Telemetry
 
@@ -74,7 +74,7 @@ def with_field(name: str, field: str, value: float) -> Any:
 def test_every_sentinel_of_every_field_that_is_read_is_unknown(name: str, field: str) -> None:
     assert sentinels(name, field)
     for value in sentinels(name, field):
-        known = Known(with_field(name, field, value))
+        known = KnownFields(with_field(name, field, value))
         if isinstance(getattr(SAMPLES[name], field), list):
             assert known.each(field) == [], value
         else:
@@ -108,9 +108,9 @@ def numbers_in(t: Telemetry) -> list[float]:
 
 def test_a_reader_cannot_read_past_the_table() -> None:
     for name, reader in READERS.items():
-        assert reader(Known(SAMPLES[name])), name
+        assert reader(KnownFields(SAMPLES[name])), name
     with pytest.raises(KeyError):
-        Known(SAMPLES["GPS_RAW_INT"]).read("vel")
+        KnownFields(SAMPLES["GPS_RAW_INT"]).read("vel")
 
 
 def test_a_position_at_the_end_of_its_type_is_none() -> None:
@@ -139,4 +139,4 @@ def test_a_heading_and_a_speed_that_are_unknown_stay_unknown() -> None:
 
 def test_px4_says_minus_one_ampere_for_a_current_that_it_does_not_measure() -> None:
     message = with_field("BATTERY_STATUS", "current_battery", -100)
-    assert Known(message).read("current_battery") is None
+    assert KnownFields(message).read("current_battery") is None

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from service.telling import Plan, Telling
+from service.telling import Telling, TellingPlan
 from service.telling.cot import AIRCRAFT, FOUND, GONE, SEARCHED, SUSPECT, Events
 from service.telling.searched import Outline
 from service.telling.settings import Tak
@@ -238,7 +238,7 @@ def test_the_ground_that_was_searched_is_told_beside_the_rest(monkeypatch: pytes
             inbox.bind(("127.0.0.1", 0))
             inbox.setblocking(False)
             tak = Tak("udp", "127.0.0.1", inbox.getsockname()[1], "Falcon")
-            telling = Telling(Plan(run="run", tak=tak))
+            telling = Telling(TellingPlan(run="run", tak=tak))
 
             async def ask() -> RunState:
                 return state()

@@ -13,7 +13,7 @@ import pytest
 from service.config import TellingSettings
 from service.errors import BadInput
 from service.telling import read_plan
-from service.telling.news import News
+from service.telling.news import Announcement
 from service.telling.settings import Hook
 from service.telling.webhook import MOST_WAITING, Webhook
 
@@ -48,11 +48,13 @@ def status(code: int) -> bytes:
     return f"HTTP/1.1 {code} X\r\nContent-Length: 2\r\n\r\nok".encode()
 
 
-def news(name: str) -> News:
-    return News(name, "found", 0.0, "run", "field", "FOUND", (47.0, 8.0), "here", 0.9, 5.0, f"text of {name}")
+def news(name: str) -> Announcement:
+    return Announcement(
+        name, "found", 0.0, "run", "field", "FOUND", (47.0, 8.0), "here", 0.9, 5.0, f"text of {name}"
+    )
 
 
-async def told(hook: Hook, *all_news: News) -> None:
+async def told(hook: Hook, *all_news: Announcement) -> None:
     webhook = Webhook(hook, first_pause_s=0.01)
     working = asyncio.create_task(webhook.run())
     for each in all_news:

@@ -11,7 +11,7 @@ import pytest
 from service.config import Settings
 from service.search import Search, begin
 from service.survey import AREA, survey
-from service.view.estimate import Estimator, Forecast, Searcher
+from service.view.estimate import Estimator, Forecast, SearchingAircraft
 from tests.service.export.recorded import SETTINGS, field_grid
 
 
@@ -25,7 +25,9 @@ def latest(estimator: Estimator, *crew: Search) -> Forecast:
     """The first forecast, once it is there."""
     for _ in range(2000):
         if (
-            forecast := estimator.latest([Searcher(each, each.grid.start, "north") for each in crew], 100.0)
+            forecast := estimator.latest(
+                [SearchingAircraft(each, each.grid.start, "north") for each in crew], 100.0
+            )
         ) is not None:
             return forecast
         time.sleep(0.05)
@@ -76,5 +78,5 @@ def test_two_are_expected_in_little_more_than_half_of_the_time_of_one(search: Se
     assert one_s is not None
     assert 0.45 * one_s < pair_s < 0.8 * one_s  # the field is small, and both start in one corner
     assert "for the 2 aircraft that search now" in together.to_goals(0.0, 100.0)["basis"]
-    one = [Searcher(first, first.grid.start, "north")]
+    one = [SearchingAircraft(first, first.grid.start, "north")]
     assert estimator.latest(one, 100.0) is None  # that of both is none of one

@@ -13,7 +13,7 @@ from service.search import Search
 from service.survey import survey
 from service.view.names import name_in
 from service.view.next import STATE_WORDS, choices, next_state
-from service.view.scene import Ground
+from service.view.scene import SearchGround
 
 DEMO = Path(__file__).parents[3] / "config" / "area.geojson"
 NAMES, REGIONS = ("shieling ruin", "burn"), (0.2, 0.004)
@@ -26,7 +26,7 @@ def option(region: int | None, *, chosen: bool = False, mass: float | None = 0.5
 def test_regions_have_the_names_of_the_priors_that_made_them() -> None:
     settings = Settings()
     area, grid = survey(DEMO, None, settings)
-    ground = Ground.of(area, grid, Search(grid, settings).regions.labels, "lookahead")
+    ground = SearchGround.of(area, grid, Search(grid, settings).regions.labels, "lookahead")
     assert ground.names == ("shieling ruin", "last phone fix", "burn, north-west", "burn, south-east")
     places = {each["name"]: each["role"] for each in ground.describe()["places"]}
     assert places == {"last phone fix": "prior", "shieling ruin": "prior", "burn": "prior", "mast": "exclude"}

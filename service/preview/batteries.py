@@ -30,6 +30,7 @@ HIGHER = (1.5, 2.0)
 """So many times as high it is tried whether fewer batteries would do."""
 
 Told = Callable[[str, float], None]
+"""Hears what is being worked out and how far it is, 0 to 1."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from service.config import Settings
 from service.errors import BadInput
 from service.geometry import LatLon
 from service.mission.energy import Energy, Left, WayHome
-from service.preview.batteries import Help, OneBattery, first_look_s, fly_batteries, what_would_help
+from service.preview.batteries import Help, OneBattery, Told, first_look_s, fly_batteries, what_would_help
 from service.preview.foresight import Foresight, foresee
 from service.preview.pace import farthest_from_launch, way_metres
 from service.search import Search
@@ -31,9 +31,6 @@ ENOUGH = 0.98
 
 FIRST_S = 300.0
 """What counts as the first minutes."""
-
-Told = Callable[[str, float], None]
-"""Hears what is being worked out and how far it is, 0 to 1."""
 
 
 @dataclass(frozen=True)

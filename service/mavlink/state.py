@@ -107,6 +107,7 @@ class LinkMemory:
         self._text_id = 0
         self._brake: int | None = None
         self._stop: Command | None = None
+        """The last stop without a target; it is sent several times."""
         self._stop_sent = -math.inf
         """When a stop without a target was sent last, until a target is sent."""
         self._told_of: set[tuple[int, str]] = set()

@@ -125,6 +125,8 @@ class Strangers:
             self._learn(named)
         elif self._resting is None or not near(self._resting, named, self._tolerance_m):
             return self._suspicious(named, now)
+        else:
+            self._resting = named  # one that still brakes, or drifts, names where it is
         self._suspect, self._times_suspect = None, 0
         return overtaken
 
@@ -134,11 +136,9 @@ class Strangers:
         return self._suspect if newest and 0.0 <= self._suspect_at - self._sent_at < _OVERTAKES_S else None
 
     def _learn(self, named: Target) -> None:
-        if self._resting is not None and near(self._resting, named, self._tolerance_m):
-            self._times_resting += 1
-            self._settled = self._times_resting >= _SETTLED_AFTER
-        else:
-            self._resting, self._times_resting = named, 1
+        again = self._resting is not None and near(self._resting, named, self._tolerance_m)
+        self._resting, self._times_resting = named, self._times_resting + 1 if again else 1
+        self._settled = self._times_resting >= _SETTLED_AFTER
 
     def _suspicious(self, named: Target, now: float) -> Target | None:
         if self._suspect is None or not near(self._suspect, named, self._tolerance_m):

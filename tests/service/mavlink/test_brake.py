@@ -95,6 +95,21 @@ def test_each_stop_that_arrives_may_end_somewhere_else(late_s: float) -> None:
     assert len(rig.of(TargetReplaced)) == 1
 
 
+def test_an_aircraft_that_still_brakes_names_where_it_is_and_nobody_sends_it_there() -> None:
+    rig = blind("px4")
+    rig.core.brake(rig.now)
+    rig.say(rig.peer.ack(REPOSITION, mavlink.MAV_RESULT_UNSUPPORTED))
+    for number in [*range(24), 24, 24, 24]:  # five metres, told often
+        rig.peer.target = (NORTH + (number * 0.4 - number**2 / 120.0) * 9e-6, LON, ALT)
+        rig.now += 0.03
+        rig.say(rig.peer.position_target(rig.now))
+    assert rig.of(TargetReplaced) == []
+    rig.run(8.0)
+    rig.peer.target = (NORTH + 9e-4, LON, ALT)  # and this is somebody's
+    rig.run(4.0)
+    assert len(rig.of(TargetReplaced)) == 1
+
+
 @FLAVORS
 def test_a_pilot_who_takes_over_while_it_brakes_wins(flavor: str) -> None:
     rig = blind(flavor)

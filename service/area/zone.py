@@ -11,7 +11,7 @@ class Zone:
     """A shape on a plane, ready to be asked many times what touches it or lies in it.
 
     GEOS answers fast about a prepared shape, but what it keeps for that is not safe to share: two threads that ask the
-    same one at once end the process (libgeos issue 825). So each thread has a copy of its own.
+    same one at once end the process (GEOS: "Prepared geometry is not thread-safe"). So each thread has its own copy.
 
     Attributes:
         shape: as given, not prepared; safe in any thread.

@@ -360,10 +360,8 @@ class LinkCore(LinkMemory):
         self._hearing.on_answer()
         if message.command == mavlink.MAV_CMD_DO_REPOSITION:
             assert self.autopilot is not None
-            if (
-                now - self._stop_sent < _STOP_ARRIVES_S
-            ):  # each one that comes ends somewhere else, and is answered
-                self._strangers.start_over()
+            if named == us and now - self._stop_sent < _STOP_ARRIVES_S:
+                self._strangers.start_over()  # each one that comes ends somewhere else
             self._probe.on_answer(message.result)
             if self.autopilot.refuses_reposition(message.result):
                 self._watch.on_refusal(result_name(message.result))

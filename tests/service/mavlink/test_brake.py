@@ -95,6 +95,16 @@ def test_each_stop_that_arrives_may_end_somewhere_else(late_s: float) -> None:
     assert len(rig.of(TargetReplaced)) == 1
 
 
+def test_an_answer_that_is_for_anybody_does_not_hide_where_somebody_sends_it() -> None:
+    rig = blind("px4")
+    rig.core.brake(rig.now)
+    rig.run(6.0)  # it is sent no more, and rests
+    rig.peer.target = (NORTH + 9e-4, LON, ALT)
+    rig.say(rig.peer.ack(REPOSITION, mavlink.MAV_RESULT_ACCEPTED, target=(0, 0)))
+    rig.run(3.0)
+    assert len(rig.of(TargetReplaced)) == 1
+
+
 def test_an_aircraft_that_still_brakes_names_where_it_is_and_nobody_sends_it_there() -> None:
     rig = blind("px4")
     rig.core.brake(rig.now)

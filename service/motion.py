@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from roisearch import Motion
+from roisearch.motion import TURNS
+from roisearch.motion_fit import Flown, learnt
 from service.config import SPARE_M, FlightSettings
 from service.evidence.mask import HIGHEST, LOWEST
 
+log = logging.getLogger("roisearch")
 CORNER_OF_CELL = 0.35
 """Farther from its middle than this part of a cell's side no turn begins: the cell has to be seen."""
 
@@ -62,6 +67,26 @@ def within(motion: Motion, limits: MotionLimits) -> Motion:
         climb_mps=climb or motion.climb_mps,
         descent_mps=descent or motion.descent_mps,
     )
+
+
+def learnt_in_flight(motion: Motion, flights: Sequence[Flown]) -> Motion | None:
+    """How the aircraft moves by these flown paths, which `motion` is what is known of before; says so. None when they
+    do not tell."""
+    try:
+        found = learnt(motion, flights)
+    except ValueError as error:
+        log.warning("how the aircraft moves could not be learnt: %s", error)
+        return None
+    corners = ", ".join(f"{found.corner_speed(degrees):.1f}" for degrees in TURNS[:3])
+    log.info(
+        "learnt in flight: %.1f m/s, speeds up with %.1f and brakes with %.1f m/s²; corners of 45, 90 and 135° at "
+        "%s m/s",
+        found.speed_mps,
+        found.acceleration_mps2,
+        found.pace.brake,
+        corners,
+    )
+    return found
 
 
 def limits_note(motion: Motion, limits: MotionLimits) -> str:

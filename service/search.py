@@ -18,8 +18,7 @@ import numpy as np
 
 from roisearch import Belief, Decision, Motion, Regions, SearchState, make_planner, segment_regions
 from roisearch.detection import DetectionRecord
-from roisearch.motion import TURNS
-from roisearch.motion_fit import Flown, learnt
+from roisearch.motion_fit import Flown
 from roisearch.place import Place
 from roisearch.planners.base import InSeconds, Planner
 from roisearch.planners.ending import EndingPlanner
@@ -42,7 +41,7 @@ from service.ground.relief import Floats
 from service.ground.sight import seen_share
 from service.known import Known, Said
 from service.mission.energy import Left
-from service.motion import MotionLimits, limits_note, motion_of, within
+from service.motion import MotionLimits, learnt_in_flight, limits_note, motion_of, within
 from service.outside import from_outside
 from service.reach import Reach
 from service.reasons import Reason
@@ -446,23 +445,12 @@ class Search:
         return self._learning
 
     def _learn(self, flights: Sequence[Flown]) -> None:
-        try:
-            over = [replace(each, heights=self._heights_along(each.start, each.path)) for each in flights]
-            as_set = self.as_set
-            motion = learnt(as_set, over)
-        except ValueError as error:
-            log.warning("how the aircraft moves could not be learnt: %s", error)
-            return
-        corners = ", ".join(f"{motion.corner_speed(degrees):.1f}" for degrees in TURNS[:3])
-        log.info(
-            "learnt in flight: %.1f m/s, speeds up with %.1f and brakes with %.1f m/s²; corners of 45, 90 and 135° at "
-            "%s m/s",
-            motion.speed_mps,
-            motion.acceleration_mps2,
-            motion.pace.brake,
-            corners,
-        )
-        if as_set is self.as_set:  # and the aircraft that flew it is not another one by now
+        over = [replace(each, heights=self._heights_along(each.start, each.path)) for each in flights]
+        as_set = self.as_set
+        motion = learnt_in_flight(as_set, over)
+        if (
+            motion is not None and as_set is self.as_set
+        ):  # the aircraft that flew it is not another one by now
             self._thread.submit(self._reckon_with, motion).result()
 
     def forget_motion(self) -> None:

@@ -24,11 +24,12 @@ from service.border.frames import Broken
 from service.border.limits import MOST_FRAMES, MOST_IN_A_FRAME, MOST_NEWS, MOST_ORDERS, MOST_ROWS
 from service.border.memory import SharedMap
 from service.errors import BadInput
-from service.evidence.reports import OrderReceipt, OrderRequest, Receipt, Report
+from service.evidence.reports import OrderRequest, Report
+from service.http.run import TakesWords
 from service.journal import JournalLost
 from service.news.request import NewsRequest
 from service.view.feed import Moment
-from service.view.state import HeardState, RunState
+from service.view.state import RunState
 
 log = logging.getLogger("roisearch")
 LOOKING_SHARE = 0.1
@@ -39,7 +40,7 @@ LAST_LOOK_S = 1.0
 """So long a flight that is over waits for them, if there was anybody so lately."""
 
 
-class FlownRun(Protocol):
+class FlownRun(TakesWords, Protocol):
     """A run as the border needs it, in the process that flies it."""
 
     registry: CollectorRegistry
@@ -58,28 +59,6 @@ class FlownRun(Protocol):
 
     def ready(self) -> bool:
         """True while a search can take reports."""
-        ...
-
-    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
-        """Detector reports."""
-        ...
-
-    async def order(
-        self,
-        command: str,
-        place: tuple[float, float] | None = None,
-        aircraft: str | None = None,
-        system_id: int | None = None,
-    ) -> OrderReceipt:
-        """An operator's order, to one aircraft or all; what became of it. Raises BadInput."""
-        ...
-
-    async def hear(self, request: NewsRequest) -> HeardState:
-        """News from the field. Raises BadInput."""
-        ...
-
-    async def withdraw(self, name: str) -> HeardState:
-        """News are taken back. Raises BadInput."""
         ...
 
 

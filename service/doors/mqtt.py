@@ -11,7 +11,7 @@ import importlib.util
 import logging
 import ssl
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from service.cancelling import end_if_cancelled
@@ -46,6 +46,19 @@ class Broker:
     topic: str
     user: str | None = None
     password: str | None = field(default=None, repr=False)
+
+    def client(self, **options: Any) -> Client:
+        """A client of it, to be entered, with more `options` of aiomqtt.Client."""
+        import aiomqtt
+
+        return aiomqtt.Client(
+            self.host,
+            self.port,
+            username=self.user,
+            password=self.password,
+            tls_context=ssl.create_default_context() if self.tls else None,
+            **options,
+        )
 
 
 def read_broker(url: str, topic: str, credentials_file: str, *, table: str = "doors") -> Broker:
@@ -92,14 +105,7 @@ async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
     told = ""
     while True:
         try:
-            async with aiomqtt.Client(
-                broker.host,
-                broker.port,
-                username=broker.user,
-                password=broker.password,
-                tls_context=ssl.create_default_context() if broker.tls else None,
-                max_queued_incoming_messages=_MOST_QUEUED,
-            ) as client:
+            async with broker.client(max_queued_incoming_messages=_MOST_QUEUED) as client:
                 granted = await client.subscribe(broker.topic, qos=_QOS)
                 if any(_refused(code) for code in granted):
                     raise aiomqtt.MqttError(f"it refuses the subscription to {broker.topic}; see its rights")

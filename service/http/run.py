@@ -51,7 +51,33 @@ class ShownMoment(Protocol):
         ...
 
 
-class ShownRun(ShownMoment, Protocol):
+class TakesWords(Protocol):
+    """What takes in what detectors report, operators order, and the field tells."""
+
+    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
+        """Detector reports."""
+        ...
+
+    async def order(
+        self,
+        command: str,
+        place: tuple[float, float] | None = None,
+        aircraft: str | None = None,
+        system_id: int | None = None,
+    ) -> OrderReceipt:
+        """An operator's order, to one aircraft or all; what became of it. Raises BadInput."""
+        ...
+
+    async def hear(self, request: NewsRequest) -> HeardState:
+        """News from the field. Raises BadInput."""
+        ...
+
+    async def withdraw(self, name: str) -> HeardState:
+        """News are taken back. Raises BadInput."""
+        ...
+
+
+class ShownRun(ShownMoment, TakesWords, Protocol):
     """A run as the door needs it."""
 
     def scene(self) -> dict[str, Any]:
@@ -76,28 +102,6 @@ class ShownRun(ShownMoment, Protocol):
 
     async def ready(self) -> bool:
         """True while a search can take reports."""
-        ...
-
-    async def submit_all(self, reports: Sequence[Report]) -> list[Receipt]:
-        """Detector reports."""
-        ...
-
-    async def order(
-        self,
-        command: str,
-        place: tuple[float, float] | None = None,
-        aircraft: str | None = None,
-        system_id: int | None = None,
-    ) -> OrderReceipt:
-        """An operator's order, to one aircraft or all; what became of it. Raises BadInput."""
-        ...
-
-    async def hear(self, request: NewsRequest) -> HeardState:
-        """News from the field. Raises BadInput."""
-        ...
-
-    async def withdraw(self, name: str) -> HeardState:
-        """News are taken back. Raises BadInput."""
         ...
 
 

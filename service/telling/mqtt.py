@@ -16,7 +16,6 @@ import asyncio
 import contextlib
 import json
 import logging
-import ssl
 from typing import Any
 
 from service.cancelling import end_if_cancelled
@@ -68,14 +67,8 @@ class StateTopics:
         broker, will = self._broker, f"{self._broker.topic}/online"
         while True:
             try:
-                async with aiomqtt.Client(
-                    broker.host,
-                    broker.port,
-                    username=broker.user,
-                    password=broker.password,
-                    tls_context=ssl.create_default_context() if broker.tls else None,
-                    will=aiomqtt.Will(will, "false", qos=_QOS, retain=True),
-                ) as client:
+                last_word = aiomqtt.Will(will, "false", qos=_QOS, retain=True)
+                async with broker.client(will=last_word) as client:
                     self._new, self._sent = (
                         {**self._sent, **self._new},
                         {},

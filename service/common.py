@@ -6,11 +6,16 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from roisearch import Fleet
 from roisearch.place import Place, most_likely_place, place_at
 from service.area import Grid
 from service.drawing import Drawing
 from service.evidence.found import Found
+from service.evidence.observe import Observation
+from service.evidence.overlooked import Overlooked
 from service.evidence.suspects import found_at
 from service.known import Known, Said, Withdrawn
 from service.news.bearing import FieldNews
@@ -32,12 +37,14 @@ class Common:
     drawing: Drawing
     grid: Grid = field(init=False)
     """The same without what is excluded by now."""
+    overlooked: Overlooked = field(init=False)
+    """Which cells are taken as not to be seen from the air, by what was flown."""
     others: Fleet = field(default_factory=Fleet)
     """Who plans to look where; nobody is in it while one aircraft flies."""
     believing: asyncio.Lock = field(default_factory=asyncio.Lock)
     """Held while something is written down and then believed: all aircraft's reports keep the journal's order."""
     new_ground: list[Callable[[Grid], None]] = field(default_factory=list)
-    """Called when other ground may be flown over."""
+    """Called when other ground may be flown over, or can be seen."""
     _redrawing: Redrawing | None = None
     new_drawing: list[Callable[[Sketch], None]] = field(default_factory=list)
     """Called when other regions are drawn."""
@@ -48,6 +55,7 @@ class Common:
 
     def __post_init__(self) -> None:
         self.grid = self.drawn
+        self.overlooked = Overlooked(self.drawn.frame.shape)
 
     @property
     def place(self) -> Place:
@@ -88,8 +96,17 @@ class Common:
         """Believe what was seen, judged or told, exactly, at its time; see `Known.take`."""
         self.known.take(said, time)
         self._forget()
+        if isinstance(said, Observation) and self.overlooked.looked(said.cells):
+            self.fly_on(self.grid)
         if isinstance(said, (FieldNews, Withdrawn)):
             self.fly_on(self.ground_of(self.known))
+
+    def passed(self, cells: NDArray[np.int64], now: float) -> int:
+        """Cells [k, 2] should have been seen just now; how many of them are given up by that, by all that search."""
+        given_up = self.overlooked.passed(cells, now)
+        if given_up:
+            self.fly_on(self.grid)
+        return given_up
 
     def go_back(self, known: Known, grid: Grid | None) -> None:
         """Take up another state of what is known, which is ours from now on, with the ground of it."""
@@ -106,7 +123,7 @@ class Common:
         return grid
 
     def fly_on(self, grid: Grid) -> None:
-        """Other ground may be flown over now."""
+        """Other ground may be flown over, or can be seen, now."""
         self.grid = grid
         for each in self.new_ground:
             each(grid)

@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roisearch import Belief, Decision, Motion, Regions, SearchState, make_planner, segment_regions
 from roisearch.detection import DetectionRecord
@@ -31,6 +32,7 @@ from service.config import Settings, each_aircraft
 from service.drawing import Drawing
 from service.evidence.cover import covered_p_tp
 from service.evidence.found import Found
+from service.evidence.overlooked import MOST_IN_VAIN
 from service.evidence.plausible import ground_metres
 from service.evidence.sensors import field_of_view
 from service.evidence.suspects import Sightings
@@ -43,6 +45,7 @@ from service.known import Known, Said
 from service.mission.energy import Left
 from service.motion import MotionLimits, learnt_in_flight, limits_note, motion_of, within
 from service.outside import from_outside
+from service.places import written
 from service.reach import Reach
 from service.reasons import Reason
 from service.redrawing import Sketch, taking
@@ -107,8 +110,13 @@ class Search:
         """How high each cell is flown over, float [rows, cols]; None: the ground is taken as flat."""
         self.in_sight = seen_share(grid, settings)
         """In what share of directions a camera that looks ahead sees each cell, float [rows, cols]; None: in all."""
+        self._overlooked = self.common.overlooked.changes
+        self.enough = self._enough()
+        """The POS, given that the target is in the area, at which the search is at its end."""
         self.planner = self._make_planner()
-        self._make_ending()
+        self.ending = self.ending_of(self.planner)
+        """What plans the end of a battery."""
+        self.reach = Reach(grid, settings.flight)
         # one thread: a dropped decision may still be thinking, and the planner is one object
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
         self._school = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
@@ -129,11 +137,14 @@ class Search:
     @property
     def visibility(self) -> Floats | None:
         """What a look may be expected to find in each cell as a share of what it finds in the open, float [rows, cols]:
-        under cover, and behind ridges; None: all."""
-        under_cover = self.grid.visibility
-        if under_cover is None or self.in_sight is None:
-            return self.in_sight if under_cover is None else under_cover
-        return np.asarray(under_cover * self.in_sight)
+        under cover, behind ridges, and where nothing is seen for whatever reason; None: all."""
+        shares = [each for each in (self.grid.visibility, self.in_sight) if each is not None]
+        if self.common.overlooked.changes:
+            shares.append(np.where(self.common.overlooked.cells, 0.0, 1.0))
+        return np.asarray(np.prod(shares, axis=0)) if shares else None
+
+    def _enough(self) -> float:
+        return self.settings.search.stop_at_pos * self.grid.mass_seen(self.visibility)
 
     def _join(self) -> None:
         """From now on there are others: they are told what this one plans, and it is told what they do."""
@@ -206,11 +217,6 @@ class Search:
                 heights=self.heights,
                 **options,
             )
-
-    def _make_ending(self) -> None:
-        """What plans the end of a battery, on the ground that may be flown over now."""
-        self.ending = self.ending_of(self.planner)
-        self.reach = Reach(self.grid, self.settings.flight)
 
     def ending_of(self, planner: Planner) -> EndingPlanner:
         """`planner`, which at the end of a battery plans for what can be found until then: the default, that is."""
@@ -319,13 +325,18 @@ class Search:
         return self.common.ground_of(known)
 
     def _fly_on(self, grid: Grid) -> None:
-        """Other ground to fly over needs another planner, whose kernels are compiled already."""
-        if not np.array_equal(grid.flyable, self.grid.flyable):
-            self.grid = grid
-            self.planner = self._make_planner()
-            self._make_ending()
-            self._plans_otherwise()
-        self.grid = grid
+        """Other ground to fly over, or to see, needs another planner, whose kernels are compiled already."""
+        flown_as_before = np.array_equal(grid.flyable, self.grid.flyable)
+        seen_as_before = self._overlooked == self.common.overlooked.changes
+        self.grid, self._overlooked = grid, self.common.overlooked.changes
+        self.enough = self._enough()
+        if flown_as_before and seen_as_before:
+            return
+        self.planner = self._make_planner()
+        self.ending = self.ending_of(self.planner)
+        if not flown_as_before:
+            self.reach = Reach(grid, self.settings.flight)
+        self._plans_otherwise()
 
     def _plans_otherwise(self) -> None:
         """The planner is another one now."""
@@ -360,9 +371,7 @@ class Search:
         ends = self.confirmed is not None or settings.on_found == "return"
         if ends and self.found() is not None:
             return "found"
-        return (
-            f"searched to POS {sure(pos)}" if pos >= settings.stop_at_pos * self.grid.reachable_mass else ""
-        )
+        return f"searched to POS {sure(pos)}" if pos >= self.enough else ""
 
     def best(self) -> Found:
         """The most likely place as it is told, with its probability and ellipse, however small that probability is."""
@@ -402,10 +411,11 @@ class Search:
         thought = self.belief.copy()
         if now is not None and self.known.time is not None:
             thought.drift(min(max(0.0, now - self.known.time), MOST_S))
+        visibility = self.visibility if ahead else None
         for step in ahead:
             cells, p_tp, p_tn = self.fov.looks(step, state.heading, self.grid.frame.shape)
-            if self.grid.visibility is not None:
-                p_tp = covered_p_tp(p_tp, p_tn, self.grid.visibility[cells[:, 0], cells[:, 1]])
+            if visibility is not None:
+                p_tp = covered_p_tp(p_tp, p_tn, visibility[cells[:, 0], cells[:, 1]])
             thought.observe(cells, np.zeros(len(cells), dtype=np.bool_), p_tp, p_tn)
         think = functools.partial(self._decide, thought, state, left, now)
         decision = await asyncio.get_running_loop().run_in_executor(self._thread, think)
@@ -482,9 +492,33 @@ class Search:
         ground, where a look comes with every cell that is flown over."""
         if self.heights is None or not path:
             return frozenset()
+        worth = self._worth(np.array(path, dtype=np.int64))
+        return frozenset(cell for cell, is_worth in zip(path, worth.tolist(), strict=True) if is_worth)
+
+    def _worth(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether cells [k, 2] are at least as likely as the mean, and can be seen: bool [k]."""
         mean = self.belief.total / max(1, int(np.count_nonzero(self.grid.searchable)))
-        masses = self.belief.mass_at(np.array(path, dtype=np.int64))
-        return frozenset(cell for cell, mass in zip(path, masses.tolist(), strict=True) if mass >= mean)
+        hidden = self.common.overlooked.cells[cells[:, 0], cells[:, 1]]
+        return np.asarray((self.belief.mass_at(cells) >= mean) & ~hidden)
+
+    def passed(self, cell: Cell, heading: str, now: float) -> str:
+        """The aircraft has entered a cell for a look; what follows for the plan, as a sentence, or nothing."""
+        cells, _, _ = self.fov.looks(cell, heading, self.grid.frame.shape)
+        given_up = self.common.passed(cells[self._worth(cells)], now)
+        if not given_up:
+            return ""
+        ((lat, lon),) = self.grid.frame.to_latlon(np.array([cell]))
+        where = written((float(lat), float(lon)), self.grid.coordinates)
+        which = "a cell" if given_up == 1 else f"{given_up} cells"
+        return (
+            f"no look counted in {MOST_IN_VAIN} passes or more of {which} at {where}: taken as not to be seen from the "
+            "air, so that needs a ground team"
+        )
+
+    @property
+    def place_in_sight(self) -> bool:
+        """Whether the most likely place can be looked at, as far as is known."""
+        return not self.common.overlooked.cells[self.place.cell]
 
     def reason(self, decision: Decision, cell: Cell) -> Reason:
         """The decision in words: where to, how much is there, how far, and what else was weighed."""

@@ -104,7 +104,11 @@ class Grid:
     @property
     def reachable_mass(self) -> float:
         """The share of the prior in flyable cells that can be seen: what a footprint of one cell can ever find."""
-        seen = self.flyable if self.visibility is None else self.flyable & (self.visibility >= NEEDS_A_TEAM)
+        return self.mass_seen(self.visibility)
+
+    def mass_seen(self, visibility: FloatArray | None) -> float:
+        """The same where a look finds such a part, [rows, cols], of what it finds in the open; None: all."""
+        seen = self.flyable if visibility is None else self.flyable & (visibility >= NEEDS_A_TEAM)
         return float(self.prior[seen].sum())
 
     @functools.cached_property

@@ -80,6 +80,14 @@ class Think:
 
 
 @dataclass(frozen=True, slots=True)
+class Passed:
+    """The aircraft has entered this cell for a look, going in this direction."""
+
+    cell: Cell
+    heading: str
+
+
+@dataclass(frozen=True, slots=True)
 class Learn:
     """Learn from these flown paths how the aircraft moves."""
 
@@ -197,6 +205,7 @@ Effect = (
     | Note
     | WriteRow
     | Think
+    | Passed
     | Learn
     | Reckon
     | PlanAnew

@@ -39,6 +39,7 @@ from service.mission.effects import (
     Learn,
     LetGo,
     Note,
+    Passed,
     PlanAnew,
     Reckon,
     Rest,
@@ -303,11 +304,11 @@ class Mission:
     # ---- what is to be done at once
 
     def _carry_out(self, effects: Sequence[Effect]) -> None:
-        failures: list[NotStopped] = []
+        news: list[News] = []
         for effect in effects:
             match effect:
                 case Stop() | Brake():
-                    failures += self._stop(effect)
+                    news += self._stop(effect)
                 case Rest():
                     self.vehicle.stand_by("the mission wants something else now")
                 case LetGo(reason=reason):
@@ -321,6 +322,10 @@ class Mission:
                 case Think():
                     self._drop_thought()
                     self._thinking = self._group.create_task(self._think(effect))
+                case Passed(cell=cell, heading=heading):
+                    if note := self.search.passed(cell, heading, self.clock.now()):
+                        log.warning("%s%s", self.called, note)
+                        news.append(MapChanged(self.search.grid))
                 case Learn(flights=flights):
                     self.search.learn(flights)
                 case Reckon(limits=limits):
@@ -341,8 +346,8 @@ class Mission:
                     self._acting = self._group.create_task(self._act(effect))
         if not self.standing.flying:
             self.search.give_back()
-        for failure in failures:
-            self._feed(failure)
+        for each in news:
+            self._feed(each)
 
     def _stop(self, effect: Stop | Brake) -> list[NotStopped]:
         try:

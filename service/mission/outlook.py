@@ -52,7 +52,9 @@ class Outlook:
                 self.clock.now(), self.core.settings.sensor.silent_after_s
             ),
             searched=search.record.searched,
+            enough=search.enough,
             place_probability=search.place.probability if looks else 0.0,
+            place_in_sight=search.place_in_sight if looks else True,
             found=search.found() if looks else None,
             confirmed=search.confirmed is not None,
             suspect_in_view=standing.state == State.CONFIRMING and self._suspect_in_view(),

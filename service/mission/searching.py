@@ -16,7 +16,17 @@ from service.chances import share, sure
 from service.geometry import Cell, LatLon
 from service.mavlink.telemetry import Telemetry
 from service.mission.aside import Aside
-from service.mission.effects import DropThought, Learn, Note, Reckon, SendWaypoint, SetSpeed, Stop, Think
+from service.mission.effects import (
+    DropThought,
+    Learn,
+    Note,
+    Passed,
+    Reckon,
+    SendWaypoint,
+    SetSpeed,
+    Stop,
+    Think,
+)
 from service.mission.finding import found_now
 from service.mission.heights import CLIMBED_M
 from service.mission.heights import Leg as Height
@@ -59,7 +69,7 @@ class Searching(Phase):
         self._navigator = Navigator(motion_of(flight, look.chart.frame.cell_m), flight.speed_mps)
         self._lessons = Lessons()
         self._limits = MotionLimits()  # as last told
-        self._ground, self._enough = look.chart.grid, _enough(look)
+        self._ground = look.chart.grid
         self._speed_sent = self._speed_known = False
         self._way: Way | None = None
         self._aside = Aside()
@@ -121,7 +131,7 @@ class Searching(Phase):
                 self._hit_at = arrived
                 yield from self._steer(look)
             case MapChanged(grid=grid) if grid is not self._ground:
-                self._ground, self._enough = grid, _enough(look)
+                self._ground = grid
                 self._looking, self._way = False, None  # around what is excluded now, to where it may search
                 yield from self._forget()
             case MapChanged() if self._looking:
@@ -165,14 +175,16 @@ class Searching(Phase):
         """Found, searched enough, or nobody looking?"""
         settings, seen = look.settings, look.seen
         yield from found_now(look)
-        suspect = seen.place_probability >= SUSPECT_AT
+        suspect = seen.place_probability >= SUSPECT_AT and seen.place_in_sight
         if suspect:
             yield Happen(
                 Event.SUSPECT, f"something at a place that is {share(seen.place_probability)} probable"
             )
+        elif not seen.place_in_sight:
+            yield Happen(Event.CLEARED, "the place cannot be looked at from the air: it needs a ground team")
         elif seen.place_probability < CLEARED_BELOW:
             yield Happen(Event.CLEARED, f"the place is no longer likely, {share(seen.place_probability)}")
-        if seen.searched >= self._enough and look.standing.state == State.SEARCHING and not suspect:
+        if seen.searched >= seen.enough and look.standing.state == State.SEARCHING and not suspect:
             yield _searched(f"searched to POS {sure(seen.searched)}")
         elif look.flight.steps >= settings.search.max_steps:
             yield _searched(f"{look.flight.steps} steps flown")
@@ -189,6 +201,8 @@ class Searching(Phase):
         if inside and here != look.flight.cell:
             yield Enter(here)
             navigator.entered(here)
+            if not self._hovering:
+                yield Passed(here, look.chart.heading(t))
         if t.boot_time_s is not None:
             self._lessons.at(look.chart.place((t.lat, t.lon)), t.boot_time_s)
             if flights := self._lessons.take():
@@ -268,11 +282,6 @@ class Searching(Phase):
     def _forget(self) -> Iterator[Wish]:
         self._thinking = False
         yield DropThought()
-
-
-def _enough(look: Look) -> float:
-    """The POS, given that the target is in the area, at which to stop."""
-    return look.settings.search.stop_at_pos * look.chart.grid.reachable_mass
 
 
 def _searched(why: str) -> Happen:

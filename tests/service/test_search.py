@@ -170,3 +170,51 @@ def test_what_is_told_of_a_find_is_worked_out_once_for_each_word(monkeypatch: py
     again = it.found()
     assert again is not None
     assert again.probability < confirmed.probability
+
+
+def hardly_a_look(cell: Cell) -> Observation:
+    """A look at a cell that counts, and changes next to nothing."""
+    vain, one = np.zeros(1, dtype=np.bool_), np.ones(1, dtype=np.bool_)
+    return Observation(np.array([cell]), vain, np.full(1, 1e-6), np.full(1, 1.0 - 1e-9), one)
+
+
+def flown_in_vain(built: Search, cell: Cell) -> list[str]:
+    """What is said while it flies over a cell, of which no look counts, and its neighbour, of which all do."""
+    said, beside = [], (cell[0], cell[1] + 1)
+    for number in range(40):
+        said.append(built.passed(cell, "north", 30.0 * number))
+        said.append(built.passed(beside, "south", 30.0 * number + 15.0))
+        built.take(hardly_a_look(beside))
+    return [each for each in said if each]
+
+
+def test_a_cell_of_which_no_look_counts_is_not_flown_to_for_ever() -> None:
+    """The most likely cell under a cliff: seen to be circled over for five hours."""
+    built = search()
+    cell = built.place.cell
+    before, enough = built.planner, built.enough
+    (told,) = flown_in_vain(built, cell)
+    assert "needs a ground team" in told
+    assert built.planner is not before
+    assert built.visibility is not None
+    assert built.visibility[cell] == 0.0
+    assert built.enough == pytest.approx(enough - built.settings.search.stop_at_pos * GRID.prior[cell])
+    assert not built.place_in_sight
+    assert not built.worth_a_look([cell])
+    decision = asyncio.run(built.decide(SearchState(GRID.start), ()))
+    assert decision.path
+    seen = built.planner
+    built.take(hardly_a_look(cell))
+    assert built.planner is not seen
+    assert built.visibility[cell] == 1.0
+    assert built.enough == pytest.approx(enough)
+
+
+def test_what_one_aircraft_gives_up_the_others_do_not_fly_to_either() -> None:
+    first = search()
+    second = first.beside("second", first.settings)
+    cell = first.place.cell
+    before = second.planner
+    assert flown_in_vain(first, cell)
+    assert second.planner is not before
+    assert second.enough == first.enough < search().enough

@@ -64,7 +64,7 @@ def test_a_landing_ends_the_run_when_nothing_is_left_to_fly_for(finished: str) -
     if finished == "enough":
         talk.pass_by(1.0)
         talk.done()
-        talk.sees(searched=0.9999)
+        talk.sees(searched=0.9999, enough=0.999)
         talk.pass_by(1.0)
     elif finished == "found":
         talk.on(Order("return"))

@@ -9,7 +9,7 @@ import pytest
 
 from service.ground.relief import Relief
 from service.mavlink.events import Stalled
-from service.mission.effects import DropThought, Reckon, SendWaypoint, SetSpeed, Think
+from service.mission.effects import DropThought, Passed, Reckon, SendWaypoint, SetSpeed, Think
 from service.mission.heights import Leg
 from service.mission.news import Hit
 from service.mission.searching import Levelling
@@ -184,6 +184,36 @@ def test_a_search_ends_when_there_is_nothing_more_to_gain(searched: float, steps
     talk.tick()
     assert (talk.state, talk.core.standing.why_stopped) == (State.RETURNING, why)
     assert talk.core.standing.searched
+
+
+def test_it_ends_at_what_the_search_can_see_and_not_while_a_suspect_can_be_looked_at_again() -> None:
+    talk = searching()
+    talk.sees(searched=0.7, enough=0.6, place_probability=0.8)
+    talk.tick()
+    assert talk.state == State.CONFIRMING
+    talk.sees(place_in_sight=False)
+    talk.tick()
+    talk.tick()
+    assert (talk.state, talk.core.standing.why_stopped) == (State.RETURNING, "searched to POS 70.0 %")
+    assert "the place cannot be looked at from the air: it needs a ground team" in [
+        row.reason for row in talk.rows if isinstance(row, TransitionRow)
+    ]
+
+
+def test_every_cell_that_is_entered_for_a_look_is_told_of_but_not_while_it_hovers() -> None:
+    talk = searching({"sensor": {"hover_look_s": 2.0}})
+    cell, _ = talk.core.chart.cell(talk.seen.telemetry)
+    talk.tick()
+    talk.tick()
+    assert [each for each in talk.wanted if isinstance(each, Passed)] == [Passed(cell, "north")]
+    talk.sees(place_probability=0.8, suspect_in_view=True)
+    talk.pass_by(1.0)
+    lat, lon = talk.core.chart.latlon((cell[0] - 1, cell[1]))
+    talk.shows(lat=lat, lon=lon)
+    talk.flew()
+    talk.tick()
+    assert talk.core.flight.cell == (cell[0] - 1, cell[1])
+    assert len([each for each in talk.wanted if isinstance(each, Passed)]) == 1
 
 
 def test_a_place_that_stands_out_is_confirmed_or_cleared() -> None:

@@ -18,6 +18,8 @@ TURNING = 0.05
 """What part of its price a corner has for the rule; at the full price it leaves crumbs to be fetched later."""
 BANDS = (4.0, 6.0, 10.0)
 """Looks whose worth differs by less than this factor are flown over in one go."""
+_LEAST_SHARE = 1e-30
+"""Looks of which none is worth a larger share of the best are flown over in one go, too."""
 PLAIN = 2 * len(CORNERS)
 """So many of `swept` come first: lawnmowers over everything at once."""
 
@@ -63,7 +65,8 @@ def swept(cells: Ints, worth: Floats, cols: int, at: int) -> Iterator[Ints]:
     for factor in (np.inf, *BANDS):
         band = np.zeros(cells.size, dtype=np.int64)
         if np.isfinite(factor):
-            band = np.floor(np.log(worth.max() / worth) / np.log(factor)).astype(np.int64)
+            least = worth.max() * _LEAST_SHARE  # a walk leaves next to nothing in some cells
+            band = np.floor(np.log(worth.max() / np.maximum(worth, least)) / np.log(factor)).astype(np.int64)
         band = _one_look_each(cells, band)
         for turned, corner in itertools.product((False, True), CORNERS):
             pieces: list[Ints] = []

@@ -18,6 +18,7 @@ from roisearch.planners.tour.anneal import propose, rearrange
 from roisearch.planners.tour.desk import Desk, prices_of
 from roisearch.planners.tour.planner import TourPlanner
 from roisearch.planners.tour.settings import TourSettings
+from roisearch.planners.tour.starts import PLAIN, swept
 from roisearch.planners.tour.tour import price
 
 MOTION = Motion(cell_m=25.0)
@@ -351,3 +352,13 @@ def test_a_motion_makes_the_default_plan_in_seconds_where_it_can() -> None:
         make_planner("puct-regions-lite", fov=point, motion=MOTION, horizon=3)
     with pytest.raises(ValueError, match="window"):
         TourSettings(window=1)
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_hardly_worth_a_look_comes_last_in_a_lawnmower_of_levels() -> None:
+    """Where a target walks, next to nothing is left in some cells: levels beyond any number came first."""
+    cells = np.arange(12)
+    worth = np.array([1.0, 0.5, 0.2, 0.0, 5e-324, 1e-310, 1e-290, 1e-31, 1e-29, 0.1, 0.02, 0.01])
+    for order in list(swept(cells, worth, 4, 0))[PLAIN:]:
+        assert sorted(order.tolist()) == cells.tolist()
+        assert set(order[-6:].tolist()) == {3, 4, 5, 6, 7, 8}

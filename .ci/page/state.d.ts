@@ -184,6 +184,7 @@ interface RunState {
   speedup: number;
   pos: number;
   place: PlaceState;
+  unseen: PlaceState[];
   suspects: SuspectState[];
   outside: number;
   steps: number;

@@ -112,6 +112,7 @@ STATE = answers(
         "detector": {"silent_s": 0.3, "silent": False},
         "regions": [0.28, 0.17, 0.12],
         "drawn": {"number": 1, "words": "region 3 (open ground in the north) appeared"},
+        "unseen": [],
         "suspects": [
             {
                 "lat": 56.60914,

@@ -141,6 +141,15 @@ function flownBy({ system_id, autopilot }, all) {
   return flyers.size > 1 && system_id !== null ? `, by system ${system_id} (${autopilot})` : "";
 }
 
+/** Where nothing is seen from the air, the most likely first.
+ * @param {PlaceState[]} unseen */
+function places(unseen) {
+  const likely = [...unseen].sort((a, b) => b.probability - a.probability).slice(0, 3);
+  const told = likely.map((each) => `${each.written} (${percent(each.probability)})`).join("; ");
+  const more = unseen.length - likely.length;
+  return more ? `${told}; and ${more} more` : told;
+}
+
 /** Each fact: name, value, and how bad it is.
  * @param {RunState} state
  * @returns {string[][]} */
@@ -157,6 +166,7 @@ function facts({
   reports,
   outside,
   drawn,
+  unseen,
   speedup,
 }) {
   const battery = battery_doubt
@@ -185,6 +195,7 @@ function facts({
     ]),
     ["not in the area", percent(outside), ""],
     ...(drawn?.words ? [["likely places", drawn.words, ""]] : []),
+    ...(unseen.length ? [["needs a ground team", places(unseen), "bad"]] : []),
     ...(speedup > 1 ? [["clock", `simulated, ${speedup} times faster`, "doubtful"]] : []),
   ].filter(([, value]) => !past || value !== "unknown");
 }

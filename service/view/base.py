@@ -110,6 +110,20 @@ class BaseView:
             "written": written(where, how),
         }
 
+    def unseen(self) -> list[PlaceState]:
+        """Cells that are taken as not to be seen from the air."""
+        frame, how = self.search.grid.frame, self.settings.run.coordinates
+        cells = np.argwhere(self.search.common.overlooked.cells)
+        if not len(cells):
+            return []
+        belief = self.search.belief
+        shares = (belief.mass_at(cells) / belief.total).tolist()
+        places = [(float(lat), float(lon)) for lat, lon in frame.to_latlon(cells)]
+        return [
+            {"lat": lat, "lon": lon, "probability": share, "written": written((lat, lon), how)}
+            for (lat, lon), share in zip(places, shares, strict=True)
+        ]
+
     def found_state(self, found: Found | None) -> FoundState | None:
         """The place found as it is told."""
         how = self.settings.run.coordinates

@@ -219,6 +219,7 @@ class RunView(BaseView):
             "speedup": self.clock.speedup,
             "pos": record.pos,
             "place": self.place(),
+            "unseen": self.unseen(),
             "suspects": self.suspects(),
             "outside": self.search.belief.outside,
             "steps": mission.flight.steps if mission else 0,

@@ -138,6 +138,7 @@ class ReplayView(BaseView):
             "speedup": 1.0,
             "pos": self.search.record.pos,
             "place": self.place(),
+            "unseen": self.unseen(),
             "suspects": self.suspects(),
             "outside": self.search.belief.outside,
             "steps": flight.steps,

@@ -71,6 +71,23 @@ def test_the_strip_says_it_in_words_and_what_happens_next(watch: Watch, search: 
     expect(strip).to_contain_text("Windunknown")
 
 
+def test_what_cannot_be_seen_from_the_air_is_named_with_the_likeliest_first(
+    watch: Watch, search: Served
+) -> None:
+    facts = watch.page.locator("#facts")
+    expect(facts).not_to_contain_text("ground team")
+    places = [(56.60 + 0.001 * number, -4.74) for number in range(5)]
+    search.run.tell(
+        unseen=[
+            {"lat": lat, "lon": lon, "probability": 0.01 * number, "written": search.run.written((lat, lon))}
+            for number, (lat, lon) in enumerate(places)
+        ]
+    )
+    told = facts.locator("dt", has_text="needs a ground team").locator("xpath=following-sibling::dd[1]")
+    expect(told).to_contain_text(re.compile(r"^56\.604000, -4\.740000 \(4 %\); 56\.603000.*; and 2 more$"))
+    expect(told).to_have_class("bad")
+
+
 @pytest.mark.parametrize("state", list(State))
 def test_every_state_has_its_words_and_none_of_the_tools(state: State, watch: Watch, search: Served) -> None:
     search.run.tell(suspects=[search.run.suspect(RUIN)])

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import jsonschema
+import pytest
 from pydantic import TypeAdapter
 
 from service.clock import Clock
@@ -41,6 +42,21 @@ def test_live_and_replay_tell_the_same_fields_and_differ_in_what_is_unknown(tmp_
             assert (value is None) == (name in KNOWN_LIVE_ALONE), name
     for state in (live, replay):
         TypeAdapter(RunState).validate_python(state, strict=True)
+
+
+def test_cells_that_are_passed_in_vain_are_told_as_not_seen_from_the_air(tmp_path: Path) -> None:
+    record(tmp_path / "run", found=True)
+    area, grid = survey(tmp_path / "run" / AREA, None, SETTINGS)
+    search = Search(grid, SETTINGS)
+    view = RunView(area, search, sensors_over(grid, SETTINGS), SETTINGS, Clock(1.0))
+    assert view.state()["unseen"] == []
+    row, col = search.place.cell
+    search.common.overlooked.cells[row, col] = True
+    (told,) = view.state()["unseen"]
+    lat, lon = grid.frame.to_latlon([[row, col]])[0]
+    assert (told["lat"], told["lon"]) == (lat, lon)
+    assert told["probability"] == pytest.approx(search.belief.probability()[row, col])
+    assert told["written"] == f"{lat:.6f}, {lon:.6f}"
 
 
 def test_the_openapi_document_has_the_schema_of_the_state_and_it_holds(tmp_path: Path) -> None:

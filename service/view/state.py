@@ -229,12 +229,12 @@ class RunState(TypedDict):
 
     `pos` is the probability of success so far, `outside` that of a target outside the area, `regions` those of the
     regions of interest, of which `drawn` tells how often they were drawn again. `unseen` are cells that were passed
-    again and again without a look that counts, which a journal does not keep: they need a ground team. `steps`
-    are cells flown; `reason` and `options` are the last decision's, `ahead` the way from here as decided. `battery_doubt` says what is reckoned when
-    the battery's level is not told (any longer). `flight_time_s` goes on over all processes and all `sorties` of a run;
-    these are told when they are over. `words` is the state for people, `next` what happens next and `choices` what was
-    weighed for it, with the area file's names; `height_above_ground_m` is over the height model, or over home where the
-    ground is taken as flat.
+    again and again without a look that counts, which a journal does not keep: they need a ground team. `steps` are
+    cells flown; `reason` and `options` are the last decision's, `ahead` the way from here as decided.
+    `battery_doubt` says what is reckoned when the battery's level is not told (any longer). `flight_time_s` goes on
+    over all processes and all `sorties` of a run; these are told when they are over. `words` is the state for
+    people, `next` what happens next and `choices` what was weighed for it, with the area file's names;
+    `height_above_ground_m` is over the height model, or over home where the ground is taken as flat.
     `aircraft` are all that fly; what else is told of an aircraft is of the first that has not ended.
     """
 

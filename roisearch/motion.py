@@ -40,8 +40,9 @@ class Motion:
 
     A path is flown from middle to middle of its cells. A corner is rounded: the aircraft leaves the leg
     `corner_m` before the middle and joins the next as far behind it, on an arc that it can hold with its
-    acceleration, which gives the speed there; turning round is a full stop. It speeds up with
-    `acceleration_mps2` and brakes with `braking_mps2` in between, never faster than `speed_mps`.
+    acceleration, which gives the one speed there; turning round is a full stop. It speeds up with
+    `acceleration_mps2` and brakes with `braking_mps2` in between, never faster than `speed_mps`. (For who brakes
+    much more weakly than it speeds up, and would brake in one corner for the next, that is up to a fifth too long.)
 
     Attributes:
         cell_m: length of a cell's side.

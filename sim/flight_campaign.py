@@ -6,9 +6,11 @@ import argparse
 import json
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
+
+from pydantic import TypeAdapter
 
 from roisearch.planners.outside import is_outside
 from roisearch.registry import PLANNERS
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 T = TypeVar("T", bound="DataclassInstance")
+D = TypeVar("D", bound="DataclassInstance")
 RESULT = "result.json"
 GOES_ON = "With --out, the same command goes on where it was interrupted."
 
@@ -72,15 +75,27 @@ def seeds_of(options: argparse.Namespace) -> range:
     return range(options.first_seed, options.first_seed + options.seeds)
 
 
-def kept(folder: Path, fly: Callable[[], T], read: Callable[[dict[str, Any]], T]) -> T:
-    """What came of a flight: as it is kept in its folder, else it is flown and kept there.
+def kept(
+    folder: Path, kind: type[T], fly: Callable[[], T], same: Callable[[T], bool] = lambda result: True
+) -> T:
+    """What came of a flight: a `kind` of dataclass as it is kept in its folder, else it is flown and kept there.
 
-    What an interrupted one has left is removed first. `read` makes a result of the fields of one.
+    What an interrupted one has left is removed first. Raises BadInput when what is kept is not the `same` flight.
     """
-    file = folder / RESULT
+    file, plain = folder / RESULT, TypeAdapter(kind)
     if file.exists():
-        return read(json.loads(file.read_text(encoding="utf-8")))
+        result = plain.validate_python(json.loads(file.read_text(encoding="utf-8")))
+        if not same(result):
+            raise BadInput(f"{file} is of another flight than the one that is asked for; give another --out")
+        return result
     shutil.rmtree(folder, ignore_errors=True)
     result = fly()
-    file.write_text(json.dumps(asdict(result), indent=1), encoding="utf-8")
+    folder.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(plain.dump_python(result, mode="json"), indent=1), encoding="utf-8")
     return result
+
+
+def alike(one: D, other: D) -> bool:
+    """Whether two flights that were asked for are the same: how fast, and with what patience, makes no difference."""
+    slow = {"speedup": 1.0, "patience_s": 1.0}
+    return replace(one, **slow) == replace(other, **slow)

@@ -34,7 +34,7 @@ from rich.table import Table
 
 from service.errors import Parser
 from sim import flights_together, overground, sorties_campaign
-from sim.flight_campaign import add_flavors, add_options, check_areas, planners, seeds_of
+from sim.flight_campaign import GOES_ON, add_flavors, add_options, check_areas, kept, planners, seeds_of
 from sim.flight_times import GOALS, Times, times_of
 from sim.progress import Rest, bars
 
@@ -59,6 +59,7 @@ class SearchFlight:
     seed: int
     planner: str = "puct-regions-lite"
     target: bool = True
+    config: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -85,9 +86,16 @@ class Result:
         return self.code == 0 and error is not None and error <= within
 
 
-def fly(flight: SearchFlight, runs: Path, speedup: float, extra: Sequence[str], patience_s: float) -> Result:
+def flown(flight: SearchFlight, out: Path, speedup: float, patience_s: float) -> Result:
+    """A flight's result: as it is kept in its folder, else flown and kept there. Raises BadInput."""
+    runs = out / f"{flight.area.stem}-{flight.flavor}-{flight.planner}-{flight.seed}"
+    return kept(
+        runs, Result, lambda: fly(flight, runs, speedup, patience_s), lambda result: result.flight == flight
+    )
+
+
+def fly(flight: SearchFlight, runs: Path, speedup: float, patience_s: float) -> Result:
     """Fly one search in a process of its own."""
-    runs = runs / f"{flight.area.stem}-{flight.flavor}-{flight.planner}-{flight.seed}"
     words = [sys.executable, "-m", "service", "--area", str(flight.area), "--flavor", flight.flavor]
     words += [
         "--seed",
@@ -104,7 +112,7 @@ def fly(flight: SearchFlight, runs: Path, speedup: float, extra: Sequence[str], 
     limits = NO_LIMITS if flight.target else {**NO_LIMITS, **NO_TARGET}
     try:
         done = subprocess.run(
-            [*words, *extra],
+            [*words, *(["--config", str(flight.config)] if flight.config else [])],
             capture_output=True,
             text=True,
             timeout=patience_s,
@@ -177,8 +185,8 @@ def main(arguments: list[str]) -> int:
     parser = Parser(
         prog="roisearch-sim flights",
         description=__doc__.split("\n")[0],
-        epilog="Other campaigns, each with a --help of its own: --ground (over hills that are hard to fly over), "
-        "--battery-min MIN [--trouble] (over several batteries, with kills and another aircraft in between), "
+        epilog=f"{GOES_ON} Other campaigns, each with a --help of its own: --ground (over hills that are hard to "
+        "fly over), --battery-min MIN [--trouble] (over several batteries, with kills and another aircraft between), "
         "--aircraft N [--trouble] (several aircraft on one search, one of which loses its link).",
     )
     parser.add_argument("areas", nargs="+", type=Path, metavar="AREA", help="area files")
@@ -197,13 +205,12 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     check_areas(parser, options.areas)
     flights = [
-        SearchFlight(area, flavor, seed, planner, not options.no_target)
+        SearchFlight(area, flavor, seed, planner, not options.no_target, options.config)
         for seed in seeds_of(options)
         for area in options.areas
         for flavor in options.flavors.split(",")
         for planner in options.planners.split(",")
     ]
-    extra = ["--config", str(options.config)] if options.config else []
     console = Console()
     results: list[Result] = []
     with (
@@ -213,9 +220,7 @@ def main(arguments: list[str]) -> int:
     ):
         runs = options.out or Path(scratch)
         bar, rest = progress.add_task("flights", total=len(flights)), Rest(console, len(flights))
-        jobs = [
-            pool.submit(fly, flight, runs, options.speedup, extra, options.patience) for flight in flights
-        ]
+        jobs = [pool.submit(flown, flight, runs, options.speedup, options.patience) for flight in flights]
         began = time.monotonic()
         for job in as_completed(jobs):
             result = job.result()

@@ -26,7 +26,7 @@ from rich.console import Console
 from service.errors import Parser
 from sim.autopilot.control import Control
 from sim.autopilot.process import AutopilotProcess
-from sim.flight_campaign import add_options, check_areas, seeds_of
+from sim.flight_campaign import GOES_ON, add_options, alike, check_areas, kept, seeds_of
 from sim.progress import Rest
 from sim.separation import Separation, Watching, side_by_side
 from sim.sorties import gone_at_the_end
@@ -204,6 +204,13 @@ def fly(search: Together, folder: Path) -> JointOutcome:
     return flown
 
 
+def flown(search: Together, folder: Path) -> JointOutcome:
+    """A search's outcome: as it is kept in its folder, else flown and kept there. Raises BadInput."""
+    return kept(
+        folder, JointOutcome, lambda: fly(search, folder), lambda outcome: alike(outcome.search, search)
+    )
+
+
 def told(flown: JointOutcome) -> str:
     """One flight in a line, and what went wrong in more."""
     search, near = flown.search, flown.nearest_m
@@ -218,7 +225,9 @@ def told(flown: JointOutcome) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """The command line; exits 0 when every flight was good, else 1."""
-    parser = Parser(prog="roisearch-sim flights --aircraft", description=(__doc__ or "").split("\n")[0])
+    parser = Parser(
+        prog="roisearch-sim flights --aircraft", description=(__doc__ or "").split("\n")[0], epilog=GOES_ON
+    )
     parser.add_argument("areas", nargs="+", type=Path, metavar="AREA", help="area files")
     parser.add_argument("--aircraft", type=int, required=True, metavar="N", help="how many fly each search")
     parser.add_argument("--trouble", action="store_true", help="cut the link of one in the middle, for good")
@@ -233,7 +242,7 @@ def main(arguments: Sequence[str]) -> int:
                 search = Together(
                     area, options.aircraft, seed, options.trouble, options.speedup, options.patience
                 )
-                results.append(fly(search, (options.out or Path(scratch)) / f"{area.stem}-{seed}"))
+                results.append(flown(search, (options.out or Path(scratch)) / f"{area.stem}-{seed}"))
                 console.print(told(results[-1]), highlight=False, markup=False, soft_wrap=True)
                 rest.advance()
     good, violations = sum(each.good for each in results), sum(len(each.violations) for each in results)

@@ -176,9 +176,7 @@ def main(arguments: list[str]) -> int:
         def flown(ground: str, flavor: str, seed: int) -> OverGround:
             folder = (options.out or Path(scratch)) / f"{ground}-{flavor}-{seed}"
             speed = options.speedup, options.patience
-            return kept(
-                folder, lambda: fly(ground, flavor, seed, folder, *speed), lambda told: OverGround(**told)
-            )
+            return kept(folder, OverGround, lambda: fly(ground, flavor, seed, folder, *speed))
 
         jobs = [
             pool.submit(flown, ground, flavor, seed)

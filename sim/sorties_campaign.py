@@ -14,9 +14,7 @@ import argparse
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -26,7 +24,7 @@ from service.errors import Parser
 from service.resume import retrace, stored_run
 from service.rows import ResumedRow, SortieRow
 from service.search import Search as KnownGround
-from sim.flight_campaign import GOES_ON, RESULT, add_flavors, add_options, kept, seeds_of
+from sim.flight_campaign import GOES_ON, add_flavors, add_options, alike, kept, seeds_of
 from sim.sorties import HIDDEN, LOST, Outcome, Search, fly
 
 ALIKE = 1e-6
@@ -52,7 +50,7 @@ def lost_in(run: Path) -> list[str]:
 
 
 def flown(search: Search, folder: Path, console: Console) -> Outcome:
-    """A search's outcome: as it is kept in its folder, else flown and kept there. ValueError: another one is there."""
+    """A search's outcome: as it is kept in its folder, else flown and kept there. Raises BadInput."""
 
     def judged() -> Outcome:
         name = f"{search.flavor} seed {search.seed}"
@@ -61,20 +59,7 @@ def flown(search: Search, folder: Path, console: Console) -> Outcome:
             outcome.wrong += lost_in(run)
         return outcome
 
-    outcome = kept(folder, judged, read_outcome)
-    if not _same(outcome.search, search):
-        raise ValueError(f"{folder / RESULT}: this is of another search; give another --out")
-    return outcome
-
-
-def read_outcome(told: dict[str, Any]) -> Outcome:
-    """An outcome as it was kept."""
-    return Outcome(**{**told, "search": Search(**told["search"])})
-
-
-def _same(one: Search, other: Search) -> bool:
-    """How fast it is flown does not make it another one."""
-    return replace(one, speedup=other.speedup, patience_s=other.patience_s) == other
+    return kept(folder, Outcome, judged, lambda outcome: alike(outcome.search, search))
 
 
 def parser() -> argparse.ArgumentParser:

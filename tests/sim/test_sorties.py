@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from service.config import Settings
+from service.errors import BadInput
 from service.resume import retrace, stored_run
 from service.search import Search as KnownGround
 from service.survey import survey
@@ -141,7 +142,9 @@ def test_the_result_of_another_search_is_not_taken_for_this_one(
     monkeypatch.setattr(sorties_campaign, "fly", fly)
     flown(SEARCH, tmp_path / "a", Console(file=StringIO()))
     other = Search("px4", 3, 500.0, 15.0, True, 20.0, 60.0)
-    with pytest.raises(ValueError, match="this is of another search; give another --out"):
+    with pytest.raises(
+        BadInput, match="is of another flight than the one that is asked for; give another --out"
+    ):
         flown(other, tmp_path / "a", Console(file=StringIO()))
 
 

@@ -108,7 +108,7 @@ class Journal:
                 self._database.execute("PRAGMA synchronous=FULL")
                 self._open()
                 self._mark = Mark(path)
-                self._file = _descriptor(path)
+                self._files = [_descriptor(path), _descriptor(path.with_name(path.name + "-wal"))]
             except (sqlite3.Error, UnicodeDecodeError, OSError) as error:
                 raise _cannot_open(path, error) from error
             self._mark.move(self._last)
@@ -249,8 +249,10 @@ class Journal:
                 time.sleep(AGAIN_S)
 
     def _insert(self, entries: list[_Entry]) -> list[tuple[_Entry, int | Exception]]:
-        if os.fstat(self._file).st_nlink == 0:  # SQLite writes on into what nobody can ever read
-            raise sqlite3.OperationalError("its file has been deleted")
+        if any(
+            os.fstat(file).st_nlink == 0 for file in self._files
+        ):  # into what nobody can ever read SQLite writes on
+            raise sqlite3.OperationalError("its file, or the -wal file beside it, has been deleted")
         outcomes: list[tuple[_Entry, int | Exception]] = []
         last = self._last
         self._database.execute("BEGIN IMMEDIATE")

@@ -216,6 +216,10 @@ def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standi
     if standing.state == State.DONE:  # down before the search was over: whatever comes next is another flight
         return Standing()
     found = search.found()
+    if standing.state == State.FOUND and search.settings.search.on_found == "hover" and not search.confirmed:
+        return replace(
+            standing, state=State.HOLDING, found=found
+        )  # over a place that waits for a person's word
     going = standing.state in (State.RETURNING, State.FOUND)
     return replace(standing, found=found, why_stopped="" if found and going else standing.why_stopped)
 

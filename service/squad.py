@@ -183,6 +183,9 @@ class Squad:
 
     async def hear(self, said: FieldNews | Withdrawn) -> None:
         """News from the field, or news taken back. Raises BadInput, JournalLost."""
+        if isinstance(said, FieldNews) and said.role == "exclude":
+            for each in self.missions.values():
+                each.core.chart.refuse_over_home(said.ground, each.vehicle.telemetry)
         first = self.leading
         await first.hear(said)
         for each in self.missions.values():

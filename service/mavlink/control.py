@@ -53,7 +53,11 @@ class Control:
 
     def expect(self, mode: str, until: float) -> None:
         """We have just asked for a mode; a change to it until then is ours."""
-        self._expected[mode] = max(until, self._expected.get(mode, until))
+        self._expected[mode] = max(until, self._expected.pop(mode, until))
+
+    def asked_for(self, now: float) -> str:
+        """The mode that we have asked for last and that no heartbeat has shown yet; empty when there is none."""
+        return next((mode for mode, until in reversed(self._expected.items()) if now <= until), "")
 
     def expect_armed(self, armed: bool, until: float) -> None:
         """We have just asked to arm."""
@@ -71,16 +75,21 @@ class Control:
         """
         mode = t.mode
         climbed = t.alt_home_m >= self._climb_m - max(_CLIMB_SHARE * self._climb_m, _CLIMB_SLACK_M)
-        commanded = now <= self._expected.get(mode, now - 1.0) or (
+        asked = now <= self._expected.get(mode, now - 1.0)
+        if asked or (
             self._commanded_mode == previous
             and autopilot.follows(previous, mode, armed=t.armed, climbed=climbed)
-        )
-        if commanded:
-            self._expected.clear()
+        ):
+            self._carried_out(mode if asked else "")
             self._commanded_mode = mode
-        else:
-            self.lose(f"the mode was changed to {mode_title(mode)} and not by us")
-        return commanded
+            return True
+        self.lose(f"the mode was changed to {mode_title(mode)} and not by us")
+        return False
+
+    def _carried_out(self, mode: str) -> None:
+        """What was asked for is done in its order: a mode that was asked for after the one that shows may come yet."""
+        while mode in self._expected:
+            del self._expected[next(iter(self._expected))]
 
     def on_armed(self, armed: bool, now: float) -> bool:
         """The heartbeat shows the motors armed or disarmed; returns whether we asked for it."""

@@ -43,7 +43,7 @@ from service.mavlink.events import (
     VehicleEvent,
 )
 from service.mavlink.framing import Message, own_heartbeat
-from service.mavlink.modes import mode_title
+from service.mavlink.modes import BY_ITSELF, mode_title
 from service.mavlink.state import LinkMemory, speaks_as
 from service.mavlink.streams import Streams, streams_of
 from service.mavlink.target import Step
@@ -162,26 +162,31 @@ class LinkCore(LinkMemory):
         self._watch.start(target, now)
         return target
 
-    def hold(self, now: float, least_amsl_m: float = math.nan) -> Target:
+    def hold(self, now: float, least_amsl_m: float = math.nan) -> None:
         """Stop here, in the guided mode: at the place where the aircraft can just stop, not behind it, and at the
-        present altitude, or at the least that it may have (NaN: any).
+        present altitude, or at the least that it may have (NaN: any). What it does by itself for us, or is about to,
+        ends; a climb where it is, without a target.
 
         Raises:
             NotPermitted: as for `reposition`.
         """
+        if self._broke_off(now):
+            return
         t, autopilot = self.telemetry, self.autopilot
         if autopilot is None or not t.position_known:
             raise NotPermitted("no waypoint was sent: the position of the aircraft is not known")
         stop = stopping_point(t, autopilot.stopping_distance_m(t.ground_speed_mps))
         altitude = max(stop.alt_amsl_m, least_amsl_m) if math.isfinite(least_amsl_m) else stop.alt_amsl_m
-        return self.reposition(stop.lat, stop.lon, altitude, now)
+        self.reposition(stop.lat, stop.lon, altitude, now)
 
-    def brake(self, now: float) -> int:
-        """Stop where it can, without a position of ours: the autopilot's own way. Returns the command's ticket.
+    def brake(self, now: float) -> None:
+        """Stop where it can, without a position of ours: the autopilot's own way; see `hold` for what ends with it.
 
         Raises:
             NotPermitted: it is not ours to move now, or not flying to our waypoints. Nothing was sent.
         """
+        if self._broke_off(now):
+            return
         reason = self.why_not_command(now)
         if reason is None and self.autopilot is not None:
             reason = gates.why_not_guided(self.autopilot, self.telemetry)
@@ -189,10 +194,40 @@ class LinkCore(LinkMemory):
             reason = "the aircraft is not armed"
         if reason is not None or self.autopilot is None:
             raise NotPermitted(f"no stop was sent: {reason}")
+        self._stop_by(self.autopilot.brake(), now)
+
+    def goes_by_itself(self, now: float) -> bool:
+        """Whether it takes off, returns or lands by our order, or is about to, which the last heartbeat need not show
+        yet: such an order is on its way, and neither a waypoint nor silence takes it back."""
+        t, autopilot = self.telemetry, self.autopilot
+        if autopilot is None or not t.armed:
+            return False
+        mode = self._control.asked_for(now) or t.mode
+        return self._takes_off or autopilot.mode_kind(mode) in BY_ITSELF
+
+    @property
+    def _takes_off(self) -> bool:
+        return self._climbs and self.telemetry.landed_state != "in_air"
+
+    def _broke_off(self, now: float) -> bool:
+        """End what it does by itself, before a stop; whether it stands by that alone, or did already."""
+        t, autopilot = self.telemetry, self.autopilot
+        if autopilot is None or self.why_not_command(now) is not None:
+            return False
+        if t.mode == autopilot.brake().goal_mode:
+            return True
+        if not self.goes_by_itself(now):
+            return False
+        if self._takes_off:
+            self._stop_by(autopilot.break_off_climb(), now)
+            return True
+        self._book.submit(autopilot.set_mode(autopilot.guided_mode), now)
+        return False
+
+    def _stop_by(self, command: Command, now: float) -> None:
         self._watch.clear()
-        self._stop = self.autopilot.brake()
-        self._brake = self.request(self._stop, now)
-        return self._brake
+        self._stop = command
+        self._brake = self.request(command, now)
 
     def request(self, command: Command, now: float, *, ordered: bool = False) -> int:
         """Send a command; returns the ticket of its CommandDone.
@@ -316,11 +351,12 @@ class LinkCore(LinkMemory):
             self._streams.start_over()
         if after.mode != before.mode:
             self._mode_changed(autopilot, before.mode, now)
+            self._done(self._book.on_mode(after.mode, now))
         elif self._control.held and autopilot.holds_by_failsafe(
             after.mode, after.system_status, self._lately_said(now)
         ):
             self._failsafe_holds(autopilot, after.mode, now)
-        self._done(self._book.on_mode(after.mode, now))
+        self._climbs &= after.armed and self.telemetry.landed_state != "in_air"
         self._done(self._book.on_armed(after.armed, now))
         if after.armed != before.armed:
             commanded = self._control.on_armed(after.armed, now)

@@ -19,6 +19,9 @@ class ModeKind(StrEnum):
     """Somebody else's plan: a mission, another computer, a mode we do not know."""
 
 
+BY_ITSELF = frozenset({ModeKind.TAKEOFF, ModeKind.RETURN, ModeKind.LAND})
+"""What an autopilot flies by itself once it was ordered to, whatever waypoint it is sent."""
+
 _TITLES = {
     "MANUAL": "Manual",
     "ALTCTL": "Altitude",

@@ -108,6 +108,8 @@ class LinkMemory:
         self._brake: int | None = None
         self._stop: Command | None = None
         """The last stop without a target; it is sent several times."""
+        self._climbs = False
+        """A take-off was ordered, and has not ended as far as is heard."""
         self._stop_sent = -math.inf
         """When a stop without a target was sent last, until a target is sent."""
         self._told_of: set[tuple[int, str]] = set()
@@ -224,6 +226,7 @@ class LinkMemory:
             self._strangers.start_over()
         if command.height_m is not None:
             self._control.climb_to(command.height_m)
+            self._climbs = True
         if command.number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             self._control.expect_armed(True, now + self.settings.mode_window_s)
         self._send(command.message(self.telemetry.system_id, _AUTOPILOT, confirmation), command.number)

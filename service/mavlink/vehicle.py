@@ -216,7 +216,7 @@ class Vehicle:
         self._shell.pump()
         if not self.telemetry.guided and there:
             raise NotPermitted(f"its pilot has selected {mode_title(self.telemetry.mode)}")
-        if not self.telemetry.guided:
+        if not self.telemetry.guided or self._core.goes_by_itself(self._clock.now()):
             autopilot = self._need_autopilot()
             await self._reach(autopilot.set_mode(autopilot.guided_mode), autopilot.guided_mode, ordered=True)
         self._core.take_control(self._clock.now())

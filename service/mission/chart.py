@@ -102,6 +102,14 @@ class Chart:
         """Over an exclusion."""
         return bool(shapely.contains_xy(self.grid.keep_out.core.prepared, *self.metres(point)))
 
+    def refuse_over_home(self, excluded: shapely.Geometry | None, t: Telemetry) -> None:
+        """Raises BadInput where ground that is to be excluded (in degrees, x = longitude) has home in it."""
+        lat, lon = home = self.home(t)
+        if excluded is not None and shapely.contains_xy(excluded, lon, lat):
+            raise BadInput(
+                f"the exclusion: the aircraft's home, {self.written(home)}, lies in it; move one of the two"
+            )
+
     def route(self, start: LatLon, goal: LatLon) -> list[LatLon]:
         """The way to `goal` around the exclusions; straight there when they leave none."""
         try:

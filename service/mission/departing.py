@@ -7,6 +7,7 @@ Whoever has flown already takes off again only on a fresh order, or when the pil
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from service.mission.effects import (
@@ -222,11 +223,15 @@ class TakingOff(Phase):
         self._turn = Turn()
         self._failed: Failed | None = None
         self._patient_until = 0.0
+        self._doubted_since = math.inf
 
     def tick(self, look: Look) -> Iterator[Wish]:
-        """The next step, once the others leave room for it. After one that failed, what the pilot did may be told yet:
-        the run goes on then."""
+        """The next step, once the position is trusted and the others leave room for it. After one that failed, what the
+        pilot did may be told yet: the run goes on then."""
         if not self._begun:
+            if doubts := look.helm.doubts(look.seen.telemetry, look.now):
+                yield from self._wait("; ".join(doubts), look)
+                return
             why = look.helm.traffic.take_off(look.seen.telemetry, self._height_m, look.seen.others, look.now)
             yield from self._turn.wait(why, "to take off", look)
             if why:
@@ -242,6 +247,14 @@ class TakingOff(Phase):
                 yield self._in_vain(self._failed.reason, look)
         elif not look.busy and self._left:
             yield self._left[0]
+
+    def _wait(self, doubts: str, look: Look) -> Iterator[Wish]:
+        """What would hold it in the air keeps it on the ground, for as long as arming would be tried."""
+        if math.isinf(self._doubted_since):
+            self._doubted_since = look.now
+            yield from warn(f"the take-off waits for the position: {doubts}", look)
+        elif look.now - self._doubted_since > look.settings.link.connect_timeout_s:
+            yield self._in_vain(doubts, look)
 
     def on(self, news: News, look: Look) -> Iterator[Wish]:
         """A step is done, or was in vain."""

@@ -29,6 +29,7 @@ _SLOWEST_MPS = 0.5  # slower over ground counts as not getting home at all
 
 _WORN = frozenset({"low", "critical", "emergency", "failed", "unhealthy"})
 _STUCK_PERCENT = 10.0  # a level that stands still while so much is used is no level
+_RISE_PERCENT = 10.0  # nor is one that has risen by more, in flight
 _FIRST_WORD_S = 15.0  # so long after the first look the battery may not have been told yet
 
 
@@ -38,21 +39,26 @@ class Level:
     def __init__(self) -> None:
         self._percent: float | None = None
         self._at = self._since = 0.0
-        self.stuck = False
-        """The same level has been told for so long that it cannot be true."""
+        self.doubt = ""
+        """Why what is told cannot be true: it has stood still for too long, or has risen; as the end of a sentence."""
 
     def update(self, told: float | None, percent_per_s: float, now: float) -> float | None:
         """Take in what is told (None: nothing) at a time in seconds; returns the level to reckon with, in percent.
 
         Untold, it is the last one told, less what `percent_per_s` has cost since; None while it never was. One that has
         not changed while `percent_per_s` has cost `_STUCK_PERCENT` is what it was when it was told first, less that.
+        Nor is one believed that is higher by more than `_RISE_PERCENT` than the last: no battery is charged in flight.
         """
-        if told is not None and told != self._percent:
-            self._percent, self._since = told, now
+        before = self._percent
+        rises = told is not None and before is not None and told > before + _RISE_PERCENT
+        believed = None if rises else told
+        if believed is not None and believed != self._percent:
+            self._percent, self._since = believed, now
         used = percent_per_s * (now - self._since)
-        self.stuck = told is not None and used > _STUCK_PERCENT
-        if told is not None:
-            self._at = self._since if self.stuck else now
+        stuck = believed is not None and used > _STUCK_PERCENT
+        self.doubt = "has risen in flight" if rises else "stands still" if stuck else ""
+        if believed is not None:
+            self._at = self._since if stuck else now
         if self._percent is None:
             return None
         return max(0.0, self._percent - percent_per_s * (now - self._at))
@@ -235,8 +241,8 @@ class Energy:
     level: float | None = None
     """As `percent`, reckoned between two whole ones."""
     wind: Wind | None = None
-    stuck: bool = False
-    """It is not told for all that: what is told stands still."""
+    doubt: str = ""
+    """Why it is not told for all that, as the end of a sentence: what is told stands still, say."""
 
     def needed(self) -> float | None:
         """Percent of the battery that the way home needs; None while that is not known."""
@@ -297,7 +303,7 @@ class Energy:
 
     @property
     def _silence(self) -> str:
-        return "stands still" if self.stuck else "is not told any longer"
+        return self.doubt or "is not told any longer"
 
     def _reckoned(self) -> str:
         return "" if self.told else f", reckoned since it {self._silence}"

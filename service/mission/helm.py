@@ -80,8 +80,16 @@ class Helm:
         self._straying.forget()
 
     def unfit(self, t: Telemetry, others: Sequence[Other]) -> str:
-        """Why this aircraft is not the one to begin with, or nothing: it is too far away, or another mission's."""
-        return self.too_far(t) or self.traffic.twin(t, others)
+        """Why this aircraft is not the one to begin with, or nothing: it is too far away, must not land where it would,
+        or is another mission's."""
+        return self.too_far(t) or self._no_home(t) or self.traffic.twin(t, others)
+
+    def _no_home(self, t: Telemetry) -> str:
+        """Why it must not land where its autopilot would, or nothing."""
+        home = self._chart.home(t)
+        if not self._chart.excluded(home):
+            return ""
+        return f"home, {self._chart.written(home)}, lies in an excluded area; move one of the two"
 
     def too_far(self, t: Telemetry) -> str:
         """Why the aircraft is too far from where the search is to begin, or nothing."""

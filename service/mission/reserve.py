@@ -44,10 +44,10 @@ class Reserve:
             self.wind = self._wind.update(t, under_way, now)
             home = WayHome.along(self._way(t), t.alt_home_m, self.wind, self._flight, self._return_m)
             home = home.waiting(waits_s)
-        level, stuck = percent, self._level.stuck
-        if told := t.battery_percent is not None and not stuck:
+        level, doubt = percent, self._level.doubt
+        if told := t.battery_percent is not None and not doubt:
             level = self._consumption.level(t.battery_percent, now)
-        self.energy = Energy(percent, rate, home, told, t.battery_state, level, self.wind, stuck)
+        self.energy = Energy(percent, rate, home, told, t.battery_state, level, self.wind, doubt)
 
     def _way(self, t: Telemetry) -> list[Metres]:
         """From here home around the exclusions, as (east, north) of here in metres."""

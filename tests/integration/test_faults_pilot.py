@@ -51,16 +51,49 @@ def test_a_pilots_sticks_stop_all_motion(tmp_path: Path) -> None:
 def test_a_pilot_who_stops_the_climb_is_not_an_error(tmp_path: Path) -> None:
     with flight(tmp_path, "ardupilot") as scene:
         scene.reaches("TAKEOFF")
-        deadline = time.monotonic() + 30.0
-        while scene.control.state()["up"] < 3.0:
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        until_up(scene, 3.0)
         scene.control.fault("pilot", mode="LOITER")
         scene.reaches("YIELDED", "LOITER")
         scene.sends_nothing(10.0)
         scene.control.clear("pilot")
         assert scene.order("resume") == "SEARCHING"
         scene.moves_again()
+
+
+def until_up(scene: Scene, height_m: float) -> None:
+    """Wait until the aircraft is so high."""
+    deadline = time.monotonic() + 30.0
+    while scene.control.state()["up"] < height_m:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
+@pytest.mark.parametrize("height_m", [-1.0, 4.0])
+def test_a_hold_ends_a_take_off_where_it_is(flavor: str, height_m: float, tmp_path: Path) -> None:
+    with flight(tmp_path, flavor, speedup=2.0) as scene:
+        scene.reaches("TAKEOFF")
+        while "TAKEOFF" not in str(scene.tap.motions[-1:]):
+            time.sleep(0.005)
+        until_up(scene, height_m)
+        assert scene.order("hold") == "HOLDING"
+        scene.fly(25.0)
+        assert scene.control.state()["up"] < 11.0
+        if height_m < 0.0:
+            assert not scene.control.state()["armed"]
+
+
+@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
+def test_a_hold_right_after_the_order_to_return_ends_the_return(flavor: str, tmp_path: Path) -> None:
+    with flight(tmp_path, flavor, speedup=2.0) as scene:
+        scene.searching()
+        assert scene.order("return") == "RETURNING"
+        while "RETURN" not in str(scene.tap.motions[-1:]):
+            time.sleep(0.005)
+        assert scene.order("hold") == "HOLDING"
+        scene.fly(15.0)
+        assert scene.control.state()["mode"] in ("AUTO_LOITER", "GUIDED")
+        assert scene.state() == "HOLDING"
 
 
 @pytest.mark.parametrize(

@@ -320,16 +320,19 @@ def test_a_journal_that_may_not_be_read_is_refused_in_a_sentence(
         list(read_rows(path))
 
 
-@pytest.mark.parametrize("how", ["deleted", "its folder moved"])
+@pytest.mark.parametrize("how", ["deleted", "its -wal file deleted", "its folder moved"])
 def test_a_journal_that_is_deleted_while_it_is_written_is_lost_and_one_that_is_moved_is_not(
     how: str, tmp_path: Path
 ) -> None:
     (tmp_path / "run").mkdir()
     with contextlib.closing(Journal(tmp_path / "run" / "journal.sqlite")) as journal:
         journal.write(1.0, "report", {}).result()
-        if how == "deleted":
-            shutil.rmtree(tmp_path / "run")
-            with pytest.raises(sqlite3.Error, match="its file has been deleted"):
+        if "deleted" in how:
+            if "-wal" in how:
+                (tmp_path / "run" / "journal.sqlite-wal").unlink()
+            else:
+                shutil.rmtree(tmp_path / "run")
+            with pytest.raises(sqlite3.Error, match="has been deleted"):
                 journal.write(2.0, "report", {}).result()
             assert journal.failed is not None
             return

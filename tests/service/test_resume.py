@@ -114,6 +114,16 @@ def test_a_run_is_taken_up_as_it_was_left(steps: Sequence[Step], state: State, t
     assert left(journal_of(tmp_path, steps)) == state
 
 
+@pytest.mark.parametrize(("on_found", "state"), [("hover", State.HOLDING), ("return", State.FOUND)])
+def test_what_hovers_over_a_find_until_a_person_decides_is_not_flown_home_by_a_restart(
+    on_found: str, state: State, tmp_path: Path
+) -> None:
+    settings = Settings.model_validate({"search": {"on_found": on_found}})
+    over_it = [*UP, ("SEARCHING", "confirmed", "FOUND")]
+    standing = left_standing(journal_of(tmp_path, over_it), Search(GRID, settings))
+    assert (standing.state, standing.goes_home) == (state, state == State.FOUND)
+
+
 def test_a_search_that_an_operator_finished_on_the_way_home_stays_finished_across_a_kill(
     tmp_path: Path,
 ) -> None:

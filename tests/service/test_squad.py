@@ -9,7 +9,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+import shapely
 
 from roisearch import SearchState
 from service.clock import Clock
@@ -18,13 +20,16 @@ from service.errors import BadInput
 from service.evidence.counts import Counts
 from service.evidence.reports import OrderReceipt, Receipt, Report
 from service.journal import Journal
+from service.mavlink.events import Home
 from service.mavlink.telemetry import Telemetry
+from service.mission.chart import Chart
 from service.mission.mission import Mission
 from service.mission.standing import Terms
 from service.mission.states import FINAL, State
+from service.news.bearing import FieldNews
 from service.search import Search
 from service.squad import Squad
-from tests.service.mission.flown import CELL_M, FOUND, GRID, reached
+from tests.service.mission.flown import CELL_M, FOUND, GRID, place, reached
 
 SETTINGS = Settings.model_validate(
     {"sensor": {"cell_m": CELL_M}, "aircraft": [{"name": "north", "sources": ["cam0"]}, {"name": "south"}]}
@@ -234,3 +239,38 @@ def test_one_that_is_silent_when_all_others_have_ended_is_left_but_on_the_ground
 
     asyncio.run(run())
     assert (south.state == State.ABORTED) == left
+
+
+class WithAHome(StandIn):
+    """One that hears news, and has a home beside the launch point."""
+
+    def __init__(self, name: str, home: Home) -> None:
+        super().__init__(name, Search(GRID, SETTINGS))
+        self.core = SimpleNamespace(chart=Chart(GRID))
+        self.vehicle = SimpleNamespace(telemetry=Telemetry(home=home))
+        self.heard: list[str] = []
+
+    async def hear(self, said: FieldNews) -> None:
+        self.heard.append(said.role)
+
+    def map_changed(self) -> None:
+        """Nothing follows."""
+
+
+def test_an_exclusion_over_the_home_of_any_aircraft_is_refused_and_other_news_there_are_not() -> None:
+    homes = [place(250.0, 60.0), place(60.0, 60.0)]
+    missions: Any = [
+        WithAHome(name, Home(*at, 400.0)) for name, at in zip(("north", "south"), homes, strict=True)
+    ]
+    squad = Squad(missions, SETTINGS)
+    lat, lon = homes[1]
+    nothing = np.zeros((0, 2), dtype=np.int64)
+    around = shapely.MultiPolygon([shapely.Point(lon, lat).buffer(1e-4)])
+    for role in ("searched", "exclude"):
+        news = FieldNews(role, role, "", homes[1], nothing, np.zeros(0), around)
+        if role == "exclude":
+            with pytest.raises(BadInput, match=r"the aircraft's home, .*, lies in it; move one of the two"):
+                asyncio.run(squad.hear(news))
+        else:
+            asyncio.run(squad.hear(news))
+    assert missions[0].heard == ["searched"]

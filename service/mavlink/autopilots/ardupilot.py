@@ -105,6 +105,10 @@ class ArduCopter(Autopilot):
         """The mode BRAKE. It is left by entering GUIDED again."""
         return self.set_mode("BRAKE")
 
+    def break_off_climb(self) -> Command:
+        """Its take-off is flown in the guided mode, so it has to leave that."""
+        return self.brake()
+
     def stand_still(self, system: int, component: int) -> list[Message]:
         """A velocity of zero, which GUIDED takes without asking for a position as BRAKE does."""
         return [

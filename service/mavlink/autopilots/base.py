@@ -72,6 +72,10 @@ class Autopilot(ABC):
     def brake(self) -> Command:
         """Stop as fast as is sensible and stay, by the autopilot's own estimate: no position of ours is needed."""
 
+    def break_off_climb(self) -> Command:
+        """Stop a take-off that is under way, or about to begin: where it is, and on the ground if it is there still."""
+        return self.set_mode(self.guided_mode)
+
     def stand_still(self, system: int, component: int) -> list[Message]:
         """What stops it in the guided mode when it refuses `brake`; nothing where there is no such thing."""
         return []

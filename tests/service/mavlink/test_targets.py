@@ -5,9 +5,16 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from service.mavlink.events import TargetNotTaken, TargetReplaced, TargetTaken
+from service.mavlink.events import Target, TargetNotTaken, TargetReplaced, TargetTaken
 
 from .peer import ALT, FLAVORS, LAT, LON, NORTH, REPOSITION, Rig, go
+
+
+def stopped(rig: Rig) -> Target:
+    """The target of a stop that is ordered now."""
+    rig.core.hold(rig.now)
+    assert rig.core.target is not None
+    return rig.core.target
 
 
 @FLAVORS
@@ -102,10 +109,10 @@ def test_hold_stops_ahead_and_not_behind(flavor: str) -> None:
     rig = Rig(flavor)
     rig.peer.velocity = (5.0, 0.0, 0.0)
     rig.flying()
-    target = rig.core.hold(rig.now)
+    target = stopped(rig)
     ahead_m = (target.lat - LAT) * 111_194.93
     assert 4.0 < ahead_m < 13.0
     assert (target.lon, target.alt_amsl_m) == pytest.approx((LON, ALT))
     rig.peer.velocity = (0.0, 0.0, 0.0)
     rig.run(0.5)
-    assert rig.core.hold(rig.now).lat == pytest.approx(LAT)
+    assert stopped(rig).lat == pytest.approx(LAT)

@@ -15,6 +15,7 @@ from service.mission.effects import (
     Arm,
     Connect,
     EnterGuided,
+    Note,
     ReturnToLaunch,
     SendWaypoint,
     Stop,
@@ -57,6 +58,29 @@ def test_the_row_of_a_take_off_comes_before_its_first_step() -> None:
     talk = prepared(2)
     row = WriteRow(CommandRow("take off", height_m=15.0))
     assert talk.wanted.index(row) < talk.wanted.index(EnterGuided())
+
+
+@pytest.mark.parametrize("passes", [True, False])
+def test_what_would_hold_it_in_the_air_keeps_it_on_the_ground(passes: bool) -> None:
+    doubtful = {**ON_GROUND, "home": Home(*ground.launch(), 447.0)}
+    talk = reached(State.READY, {"link": {"connect_timeout_s": 20.0}}, may_take_off=True, **doubtful)
+    talk.tick()
+    talk.done()
+    talk.pass_by(10.0)
+    assert (talk.state, talk.core.doing) == (State.TAKEOFF, None)
+    (said,) = [
+        each.text for each in talk.wanted if isinstance(each, Note) and "waits for the position" in each.text
+    ]
+    assert "447 m" in said
+    if passes:
+        talk.shows(home=Home(*ground.launch(), 400.0))
+        talk.pass_by(10.0)
+        assert talk.doing() == EnterGuided()
+        return
+    talk.pass_by(15.0)
+    assert talk.state == State.ABORTED
+    assert "447 m" in talk.core.standing.why
+    assert not [effect for effect in talk.wanted if effect in STEPS[2:]]
 
 
 @pytest.mark.parametrize("at", range(5))

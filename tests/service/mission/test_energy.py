@@ -124,18 +124,31 @@ def test_a_level_that_stands_still_while_the_battery_is_used_is_counted_down() -
     level = Level()
     told = [level.update(76.0, 0.1, float(second)) for second in range(101)]
     assert set(told) == {76.0}
-    assert not level.stuck
+    assert level.doubt == ""
     assert level.update(76.0, 0.1, 110.0) == pytest.approx(65.0)
-    assert level.stuck
+    assert level.doubt == "stands still"
     assert level.update(None, 0.1, 210.0) == pytest.approx(
         55.0
     )  # and one that falls silent then is no better
     assert level.update(76.0, 0.1, 310.0) == pytest.approx(45.0)
     assert level.update(75.0, 0.1, 320.0) == 75.0  # it lives
-    assert not level.stuck
-    assert level.update(100.0, 0.1, 330.0) == 100.0  # another battery, or the autopilot corrects itself
-    said = Energy(66.0, 0.1, WayHome(0.0, 30.0, 0.0), told=False, stuck=True)
+    assert level.doubt == ""
+    assert level.update(85.0, 0.1, 330.0) == 85.0  # the autopilot corrects itself
+    said = Energy(66.0, 0.1, WayHome(0.0, 30.0, 0.0), told=False, doubt="stands still")
     assert said.warning() == "the battery's level stands still: reckoned to be 66 %"
+
+
+def test_a_level_that_rises_in_flight_is_not_believed() -> None:
+    """A monitor that was restarted says that the battery is full again."""
+    level = Level()
+    assert level.update(40.0, 0.1, 0.0) == 40.0
+    assert level.update(49.0, 0.1, 10.0) == 49.0, "a battery that rests a little has more"
+    assert level.update(100.0, 0.1, 60.0) == pytest.approx(44.0)
+    assert level.doubt == "has risen in flight"
+    assert level.update(None, 0.1, 80.0) == pytest.approx(42.0)
+    assert level.update(100.0, 0.1, 110.0) == pytest.approx(39.0)
+    assert level.update(38.0, 0.1, 120.0) == 38.0
+    assert level.doubt == ""
 
 
 def test_a_level_that_is_counted_down_leads_home_and_is_told() -> None:

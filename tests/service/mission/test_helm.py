@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from roisearch.directions import STEPS, moves_allowed
+from service.area import Grid
 from service.config import Settings
 from service.mavlink.events import Home
 from service.mavlink.telemetry import Telemetry
@@ -19,10 +21,10 @@ from sim.soak import ground
 from tests.service.mission.flown import GRID, START, place, telemetry
 
 
-def helm(**flight: Any) -> Helm:
+def helm(grid: Grid = GRID, **flight: Any) -> Helm:
     """A helm over the soak's field, home known."""
     settings = Settings.model_validate({"flight": {"altitude_m": 15.0, **flight}, "sensor": {"cell_m": 20.0}})
-    built = Helm(Chart(GRID), settings, fresh_s=2.0, patience_s=15.0)
+    built = Helm(Chart(grid), settings, fresh_s=2.0, patience_s=15.0)
     built.reckon(telemetry())
     return built
 
@@ -124,6 +126,15 @@ def test_a_home_far_from_the_launch_point_is_refused_and_one_beside_it_told() ->
     assert (built.too_far(beside), built.far(beside)) == ("", "home is 111 m from the launch point")
     away = telemetry(home=Home(-lat, lon - 170.0, 400.0))
     assert "more than 500 m; is it the right area file?" in built.too_far(away)
+
+
+def test_nothing_takes_off_or_is_taken_over_whose_home_lies_in_an_exclusion() -> None:
+    built, (lat, lon) = helm(), place(250.0, 60.0)
+    assert built.unfit(telemetry(home=Home(lat, lon, 400.0)), ()) == ""
+    around = shapely.Point(lon, lat).buffer(1e-4)
+    why = helm(GRID.excluding(around)).unfit(telemetry(home=Home(lat, lon, 400.0)), ())
+    assert "home" in why
+    assert "lies in an excluded area" in why
 
 
 @pytest.mark.parametrize(

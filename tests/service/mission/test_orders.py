@@ -70,6 +70,17 @@ def test_a_hold_on_the_autopilots_way_home_takes_it_back_first() -> None:
     assert (talk.state, talk.core.standing.causes) == (State.HOLDING, {"operator"})
 
 
+def test_a_hold_that_is_ordered_once_more_stops_once_more() -> None:
+    talk = reached(State.HOLDING)
+    talk.wanted.clear()
+    talk.on(Order("hold"))
+    assert Stop() in talk.wanted
+    talk.pilot()
+    talk.wanted.clear()
+    talk.on(Order("hold"))
+    assert Stop() not in talk.wanted
+
+
 def test_why_a_run_stopped_is_who_ordered_it() -> None:
     talk = reached(State.SEARCHING)
     talk.on(Order("return"))

@@ -18,6 +18,7 @@ interface AircraftState {
     | "ABORTED";
   words: string;
   why: string;
+  orders: string[];
   lat: number | null;
   lon: number | null;
   height: number | null;
@@ -176,6 +177,7 @@ interface RunState {
     | "ABORTED";
   words: string;
   why: string;
+  orders: string[];
   next: NextState;
   choices: ChoiceState[];
   area: string;

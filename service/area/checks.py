@@ -55,13 +55,18 @@ def check_launch(area: SearchArea, where: Where, max_launch_m: float = MAX_LAUNC
         return
     away = distance_m(area.polygon, area.launch)
     if away > max_launch_m:
-        lat, lon = area.launch
-        swapped = abs(lon) <= 90 and distance_m(area.polygon, (lon, lat)) <= max_launch_m
-        fix = "swap longitude and latitude" if swapped else "move it to the edge of the area"
+        fix = _swapped(area.polygon, area.launch, max_launch_m) or "move it to the edge of the area"
         raise where.bad(
             f"the launch point is {away / 1000:.4g} km from the area, "
             f"more than {max_launch_m / 1000:g} km; {fix}"
         )
+
+
+def _swapped(polygon: shapely.MultiPolygon, point: LatLon, within_m: float) -> str:
+    """The fix where a point would be near enough with its longitude and latitude swapped, or nothing."""
+    lat, lon = point
+    swapped = abs(lon) <= 90 and distance_m(polygon, (lon, lat)) <= within_m
+    return "longitude and latitude are swapped, either here or in the area" if swapped else ""
 
 
 def check_prior(area: SearchArea, prior: Prior) -> None:
@@ -80,11 +85,13 @@ def check_prior(area: SearchArea, prior: Prior) -> None:
         away = shapely.distance(plane.flatten(area.ground), plane.flatten(prior.line))
         if away >= prior.width_m / 2:
             raise where.bad(f"{outside}; move it, widen it or remove it")
-    elif isinstance(prior, RingPrior):
-        if distance_m(area.ground, prior.position) >= ring_edges(prior)[-1]:
-            raise where.bad(f"{outside} (further than its last ring); move it or remove it")
-    elif distance_m(area.ground, prior.position) > FAR_SIGMAS * prior.sigma_m:
-        raise where.bad(f"{outside} (over {FAR_SIGMAS:g} sigma_m from it); move it, widen it or remove it")
+    else:
+        rings = isinstance(prior, RingPrior)
+        reach_m = ring_edges(prior)[-1] if isinstance(prior, RingPrior) else FAR_SIGMAS * prior.sigma_m
+        if distance_m(area.ground, prior.position) > reach_m:
+            how = "further than its last ring" if rings else f"over {FAR_SIGMAS:g} sigma_m from it"
+            fix = _swapped(area.ground, prior.position, reach_m)
+            raise where.bad(f"{outside} ({how}); {fix or 'move it, widen it or remove it'}")
 
 
 def ring_notes(area: SearchArea) -> list[str]:

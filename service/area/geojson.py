@@ -266,7 +266,8 @@ def multipolygon(geometry: dict[str, Any], where: Where) -> shapely.MultiPolygon
     if not coordinates:
         raise where.bad("the polygon is empty; draw it again")
     parts = [
-        polygon(rings, Where(where.source, f"{where.part}, part {i}")) for i, rings in enumerate(coordinates)
+        polygon(rings, Where(where.source, f"{where.part}, part {i}"))
+        for i, rings in enumerate(coordinates, 1)
     ]
     return as_multipolygon(shapely.union_all(parts))
 

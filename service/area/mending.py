@@ -1,4 +1,4 @@
-"""Outlines as hands and receivers draw them: what a ring that crosses itself by a slip goes around."""
+"""Outlines as hands, receivers and programs draw them: rings that cross themselves by a slip, or are left open."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ THIN = 0.1
 
 
 def mend(geometry: Json) -> str | None:
-    """Let a Polygon or MultiPolygon be what its rings go around where they cross themselves by a slip.
+    """Let a Polygon or MultiPolygon be what its rings go around where they cross themselves by a slip or are left open.
 
     Changes the geometry in place, and returns the note that says so; None where nothing was to be mended, or where
     what is wrong is no slip and stays for the reader to refuse.
@@ -32,16 +32,27 @@ def mend(geometry: Json) -> str | None:
     if not isinstance(parts, list):
         return None
     made: list[Any] = []
+    closed = [_close(ring) for rings in parts if isinstance(rings, list) for ring in rings]
     changed = False
     for rings in parts:
         mended = _mended(rings)
         changed = changed or mended is not None
         made += [rings] if mended is None else mended
     if not changed:
-        return None
+        return "its outline does not come back to its start; it is closed" if any(closed) else None
     single = len(made) == 1
     geometry.update(type="Polygon" if single else "MultiPolygon", coordinates=made[0] if single else made)
     return "its outline crosses itself by a slip; all that it goes around is taken"
+
+
+def _close(ring: Any) -> bool:
+    """Repeat the first position of a ring at its end where it is missing; whether it was."""
+    if not isinstance(ring, list) or len(ring) < 3 or not all(isinstance(each, list) for each in ring):
+        return False
+    if ring[0][:2] == ring[-1][:2]:
+        return False
+    ring.append(ring[0])
+    return True
 
 
 def goes_around(ring: list[Any]) -> bool:

@@ -16,7 +16,7 @@ from service.area.faults import refuse
 from service.area.formats import read_document
 from service.area.geojson import MOST_POSITIONS, Where, as_multipolygon, read_bytes
 from service.area.model import Prior, SearchArea
-from service.area.roles import Parts, guard, take, take_outside
+from service.area.roles import POLYGONS, Parts, guard, take, take_outside
 
 
 def read_area(
@@ -59,8 +59,9 @@ def area_of(
     notes, faults = list(document.notes), list(document.faults)
     parts = _collect(document, where, notes, faults)
     if not parts.search and not faults:
-        faults.append(_empty(notes))
-    refuse(source, faults)
+        faults.append(_empty(document.format, notes))
+    if faults and not parts.drawn:  # what lies where cannot be told
+        refuse(source, faults)
     polygon = as_multipolygon(shapely.union_all(parts.search))
     taken = shapely.union_all([item.polygon for item in parts.exclusions if not item.searchable])
     ground = as_multipolygon(shapely.difference(polygon, taken))
@@ -96,16 +97,23 @@ def area_of(
     return replace(area, notes=(*few_notes(notes), *ring_notes(area)))
 
 
-def _empty(notes: list[str]) -> str:
-    """That there is nothing to search, with what was drawn instead."""
-    said = "the search area is empty: no Polygon has the role 'search'; draw one"
+_ROLE = "no Polygon has the role 'search'; draw one"
+_DRAWN = {
+    "GPX": "GPX has no polygons; make a track or route that comes back to its start",
+    "QGroundControl plan": "draw a survey or an inclusion fence around it",
+}
+
+
+def _empty(form: str, notes: list[str]) -> str:
+    """That there is nothing to search, with how it would be drawn in a form of file, and what was drawn instead."""
+    said = f"the search area is empty: {_DRAWN.get(form, _ROLE)}, or draw it on the map of 'roisearch-service plan'"
     few = [note for note in notes if "left out" in note][:3]
     return f"{said} ({'; '.join(few)})." if few else f"{said}."
 
 
 def _collect(document: Document, where: Where, notes: list[str], faults: list[str]) -> Parts:
     """What the things of a document add up to; each fault is kept, and reading goes on."""
-    parts = Parts(document.name, document.description)
+    parts = Parts(document.name, document.description, drawn=not document.faults)
     held: dict[str, Any] = {"outside": document.outside}
     guard(where, lambda: take_outside(parts, held, where), faults)
     positions = 0
@@ -123,6 +131,8 @@ def _collect(document: Document, where: Where, notes: list[str], faults: list[st
                 notes += [f"{each.rstrip('.')}; left out" for each in wrong]
             else:
                 faults += wrong
+                parts.drawn = parts.drawn and item.geometry["type"] not in POLYGONS
+    parts.drawn = parts.drawn and bool(parts.search)
     return parts
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from service.area import lost_persons
 from service.area.document import Item, Json, one_line
+from service.area.faults import Together
 from service.area.geojson import Where, line, multipolygon, number, position, quote
 from service.area.model import (
     COVER_KINDS,
@@ -24,7 +25,6 @@ from service.area.model import (
 )
 from service.area.target import read_target
 from service.area.words import MOST_COLUMNS
-from service.errors import BadInput
 from service.geometry import LatLon
 
 POLYGONS = ("Polygon", "MultiPolygon")
@@ -38,10 +38,11 @@ _COMMON = frozenset(
 
 @dataclass
 class Parts:
-    """What the features add up to while they are read."""
+    """What the features add up to while they are read. `drawn`: all ground that they say was understood."""
 
     name: str = ""
     description: str = ""
+    drawn: bool = True
     search: list[Any] = field(default_factory=list)
     priors: list[Prior] = field(default_factory=list)
     exclusions: list[Exclusion] = field(default_factory=list)
@@ -68,18 +69,21 @@ def take(parts: Parts, item: Item, where: Where) -> None:
     """Add a thing, which has a role, to the parts.
 
     Raises:
-        BadInput: its role, its geometry or a property of it cannot be.
+        BadInput: its role, its geometry or a property of it cannot be; `BadArea` where several cannot.
     """
     role, kind = _role(item.properties, where), item.geometry["type"]
     if kind not in ROLES[role].kinds:
         allowed = " or ".join(ROLES[role].kinds)
         raise where.bad(f"the role '{role}' cannot be a {kind}; draw it as a {allowed}")
-    _check_spelling(role, item.properties, where)
-    if role != "search" and "outside" in item.properties:
-        raise where.bad("'outside' belongs to the search area; move it to the feature with the role 'search'")
-    if role != "search" and isinstance(item.properties.get("target"), dict):
-        raise where.bad("'target' belongs to the search area; move it to the feature with the role 'search'")
-    ROLES[role].take(parts, item, where)
+    with Together(where.source) as each:
+        for key, meant in _misspelt(role, item.properties).items():
+            each.faults.append(
+                f"{where.part}: it has no property {quote(key)} that is known; did you mean '{meant}'?"
+            )
+            item = replace(item, properties={**item.properties, meant: item.properties[key]})
+        each(_check_belonging, role, item.properties, where)
+        if not (item.guessed and each.faults):  # else it is left out, and no part of it may be taken
+            each(ROLES[role].take, parts, item, where)
     if item.guessed:
         parts.guessed[item.label] = item
 
@@ -124,24 +128,36 @@ def _listed() -> str:
     return f"{', '.join(first)} or {last}"
 
 
-def _check_spelling(role: str, properties: Json, where: Where) -> None:
-    known = sorted(ROLES[role].properties)
-    if len(properties) > MOST_COLUMNS:
-        return
-    for key in properties:
-        if key in _COMMON or key in KNOWN:
-            continue
-        near = difflib.get_close_matches(key, known, n=1, cutoff=0.8)
-        if near and near[0] not in properties:
-            raise where.bad(f"it has no property {quote(key)} that is known; did you mean '{near[0]}'?")
+def _check_belonging(role: str, properties: Json, where: Where) -> None:
+    for key, given in (
+        ("outside", "outside" in properties),
+        ("target", isinstance(properties.get("target"), dict)),
+    ):
+        if role != "search" and given:
+            raise where.bad(
+                f"'{key}' belongs to the search area; move it to the feature with the role 'search'"
+            )
+
+
+def _misspelt(role: str, properties: Json) -> dict[str, str]:
+    """Properties that look like one of a role that is not given, and which that is."""
+    found: dict[str, str] = {}
+    for key in properties if len(properties) <= MOST_COLUMNS else ():
+        if key not in _COMMON and key not in KNOWN:
+            near = difflib.get_close_matches(key, sorted(ROLES[role].properties), n=1, cutoff=0.8)
+            if near and near[0] not in properties:
+                found[key] = near[0]
+    return found
 
 
 def _take_search(parts: Parts, item: Item, where: Where) -> None:
-    parts.search.append(multipolygon(item.geometry, where))
+    with Together(where.source) as each:
+        shape = each(multipolygon, item.geometry, where)
+        each(take_outside, parts, item.properties, where)
+        each(take_target, parts, item.properties, where)
+    parts.search.append(shape)
     parts.name = parts.name or _text(item.properties, "name", 200)
     parts.description = parts.description or _text(item.properties, "description", 10_000)
-    take_outside(parts, item.properties, where)
-    take_target(parts, item.properties, where)
 
 
 def _take_exclusion(parts: Parts, item: Item, where: Where) -> None:
@@ -169,26 +185,31 @@ def _take_transit(parts: Parts, item: Item, where: Where) -> None:
 
 def _take_prior(parts: Parts, item: Item, where: Where) -> None:
     properties, geometry = item.properties, item.geometry
-    weight = positive(properties, "weight", where, default=1.0)
-    if geometry["type"] in POLYGONS:
-        parts.priors.append(PolygonPrior(multipolygon(geometry, where), weight, where.part))
-    elif geometry["type"] in LINES:
-        if "width_m" not in properties:
-            raise where.bad("a line prior needs width_m; give the width of the strip in metres, such as 60")
-        width_m = positive(properties, "width_m", where, default=1.0)
-        parts.priors.append(LinePrior(line(geometry, where), width_m, weight, where.part))
-    else:
-        if "sigma_m" not in properties:
-            raise where.bad("a point prior needs sigma_m; give the standard deviation in metres, such as 50")
-        sigma_m = positive(properties, "sigma_m", where, default=1.0)
-        lon, lat = position(geometry.get("coordinates"), where)
-        parts.priors.append(PointPrior((lat, lon), sigma_m, weight, where.part))
+    with Together(where.source) as each:
+        weight = each(positive, properties, "weight", where, 1.0)
+        prior: Prior
+        if geometry["type"] in POLYGONS:
+            prior = PolygonPrior(each(multipolygon, geometry, where), weight, where.part)
+        elif geometry["type"] in LINES:
+            width_m = each(positive, properties, "width_m", where, needed=_WIDTH)
+            prior = LinePrior(each(line, geometry, where), width_m, weight, where.part)
+        else:
+            sigma_m = each(positive, properties, "sigma_m", where, needed=_SIGMA)
+            prior = PointPrior(each(_place, geometry, where), sigma_m, weight, where.part)
+    parts.priors.append(prior)
 
 
 def _take_ipp(parts: Parts, item: Item, where: Where) -> None:
-    properties = item.properties
-    weight = positive(properties, "weight", where, default=1.0)
-    lon, lat = position(item.geometry.get("coordinates"), where)
+    with Together(where.source) as each:
+        weight = each(positive, item.properties, "weight", where, 1.0)
+        place = each(_place, item.geometry, where)
+        rings = each(_rings, item.properties, where)
+    rings_m, about = rings
+    parts.priors.append(RingPrior(place, rings_m, about, weight, where.part))
+
+
+def _rings(properties: Json, where: Where) -> tuple[tuple[float, float, float, float], str]:
+    """The distances in metres within which 25, 50, 75 and 95 % are found, and whose they are. Raises BadInput."""
     if "rings_m" in properties:
         given = (
             [number(each) for each in properties["rings_m"]]
@@ -201,30 +222,41 @@ def _take_ipp(parts: Parts, item: Item, where: Where) -> None:
                 f"rings_m is {quote(properties['rings_m'])}; give the distances in metres within which 25, 50, 75 and "
                 "95 % are found, each larger than the last"
             )
-        rings, about = (good[0], good[1], good[2], good[3]), "rings_m"
-    else:
-        subject, terrain = properties.get("subject"), properties.get("terrain")
-        if not isinstance(subject, str):
-            raise where.bad("an ipp needs a subject, such as 'hiker', or rings_m")
-        if terrain is not None and not isinstance(terrain, str):
-            raise where.bad(f"terrain is {quote(terrain)}; use {', '.join(lost_persons.TERRAINS)}")
-        try:
-            rings, about = lost_persons.rings(subject, terrain)
-        except ValueError as error:
-            raise where.bad(str(error)) from None
-    parts.priors.append(RingPrior((lat, lon), rings, about, weight, where.part))
+        return (good[0], good[1], good[2], good[3]), "rings_m"
+    subject, terrain = properties.get("subject"), properties.get("terrain")
+    if not isinstance(subject, str):
+        raise where.bad("an ipp needs a subject, such as 'hiker', or rings_m")
+    if terrain is not None and not isinstance(terrain, str):
+        raise where.bad(f"terrain is {quote(terrain)}; use {', '.join(lost_persons.TERRAINS)}")
+    try:
+        return lost_persons.rings(subject, terrain)
+    except ValueError as error:
+        raise where.bad(str(error)) from None
 
 
 def _take_launch(parts: Parts, item: Item, where: Where) -> None:
     if parts.launch is not None:
         raise where.bad("this is a second launch point; keep one")
-    lon, lat = position(item.geometry.get("coordinates"), where)
-    parts.launch, parts.launch_item = (lat, lon), item
+    parts.launch, parts.launch_item = _place(item.geometry, where), item
 
 
-def positive(properties: Json, key: str, where: Where, *, default: float) -> float:
-    """A property that is a finite number above 0. Raises BadInput."""
+def _place(geometry: Json, where: Where) -> LatLon:
+    """Where a Point is. Raises BadInput."""
+    lon, lat = position(geometry.get("coordinates"), where)
+    return lat, lon
+
+
+_WIDTH = "a line prior needs width_m; give the width of the strip in metres, such as 60"
+_SIGMA = "a point prior needs sigma_m; give the standard deviation in metres, such as 50"
+
+
+def positive(
+    properties: Json, key: str, where: Where, default: float | None = None, *, needed: str = ""
+) -> float:
+    """A property that is a finite number above 0. Raises BadInput, with `needed` where it is missing."""
     raw = properties.get(key, default)
+    if needed and key not in properties:
+        raise where.bad(needed)
     value = number(raw)
     if value is None or not math.isfinite(value) or value <= 0:
         raise where.bad(f"{key} is {quote(raw)}; give a finite number greater than 0")
@@ -252,10 +284,8 @@ KNOWN = frozenset({"role"}).union(*(role.properties for role in ROLES.values()))
 
 
 def guard(where: Where, call: Callable[[], None], faults: list[str]) -> bool:
-    """Call something and keep what it refuses as a fault, without the file's name; False when it did."""
-    try:
-        call()
-    except BadInput as error:
-        faults.append(str(error).removeprefix(f"{where.source}: "))
-        return False
-    return True
+    """Call something and keep what it refuses as faults, without the file's name; False when it did."""
+    each = Together(where.source)
+    each(call)
+    faults += each.faults
+    return not each.faults

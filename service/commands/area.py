@@ -39,6 +39,8 @@ def main(arguments: list[str]) -> int:
     from service.config import read_settings
     from service.survey import read_survey
 
+    if options.out is not None and options.out.resolve() == options.file.resolve():
+        raise BadInput(f"{options.out}: --out is the file itself, which is left as it is; give another one")
     settings = read_settings(options.config)
     area, document = read_survey(options.file, settings)
     said = understood(area, document, settings.run.coordinates)

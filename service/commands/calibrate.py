@@ -47,7 +47,7 @@ def main(arguments: list[str]) -> int:
         if not rows:
             raise BadInput(f"{options.file}: no pass has a score, so there is no table to make")
         write_table(rows, options.table)
-        print(f"{options.table}: {len(rows)} rows; set sensor.calibration_file to it")
+        print(f"{options.table}: {len(rows)} row{'s' * (len(rows) != 1)}; set sensor.calibration_file to it")
     if options.picture is not None:
         _draw(rows or [now], options.picture)
         print(f"{options.picture}: p_tp and p_tn by threshold, with 95 % intervals")

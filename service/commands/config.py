@@ -52,12 +52,16 @@ def main(arguments: list[str]) -> int:
             print(sentence, file=sys.stderr)
         return 2
     settings = read_settings(options.file)
-    if options.word == "check":
-        from service.telling.settings import read_plan
-
-        read_plan(settings.telling)
     origin = sources(options.file, os.environ)
     changed = [key for key in KNOWN_KEYS if key in origin]
+    if options.word == "check":
+        from service.beforehand import refused
+
+        wrong = [f"{origin.get(key, options.file)}: {sentence}" for key, sentence in refused(settings)]
+        for sentence in wrong:
+            print(sentence, file=sys.stderr)
+        if wrong:
+            return 2
     if options.word == "check":
         print(f"{options.file}: nothing is wrong; {len(changed)} of {len(KNOWN_KEYS)} settings are given")
     for key in KNOWN_KEYS if options.word == "show" else changed:

@@ -81,12 +81,19 @@ def main(arguments: Sequence[str]) -> int:
 
 def _check_file(file: Path, settings: Settings) -> None:
     """Raises BadInput, before anybody draws, when nothing can be saved there or what is there is no area."""
-    from service.http.plan import AreaPlan
+    from service.survey import read_survey
 
     folder = file.absolute().parent
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise BadInput(f"{file}: cannot be written there; give --out in a folder that is there and yours")
-    AreaPlan(file, settings).so_far()
+    if not file.exists():
+        return
+    _, document = read_survey(file, settings)
+    if document.format != "GeoJSON":
+        raise BadInput(
+            f"{file}: this is {document.format}, and what is saved here is GeoJSON, which would take its place; make a "
+            f"file to draw on with roisearch-service area check {file} --out area.geojson"
+        )
 
 
 async def _draw(file: Path, settings: Settings, door: Door) -> bool:

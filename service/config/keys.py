@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from service.complaint import complaint
 from service.config.tables import AircraftSettings, SensorSettings, Settings
 from service.errors import BadInput, shown
 
@@ -57,7 +58,7 @@ def _problem(details: Any) -> tuple[str, str]:
         known = KNOWN_KEYS if "." in key else tuple(Settings.model_fields)
         hint = f"did you mean '{near}'?" if near else f"known are {', '.join(known)}"
         return key, f"there is no setting '{key}'; {hint}"
-    return key, f"'{key}' = {shown(details['input'])} is not possible: {details['msg']}"
+    return key, f"'{key}' = {shown(details['input'])} is not possible: {complaint(details)}"
 
 
 def checked(values: dict[str, Any], where: str) -> Settings:

@@ -10,7 +10,8 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 
 from pydantic import ValidationError
 
-from service.evidence.reports import Receipt, Report
+from service.complaint import complaint
+from service.evidence.reports import Receipt, Report, field_names
 from service.http.rate import Buckets
 from service.http.run import Unanswered
 from service.journal import JournalLost
@@ -103,10 +104,13 @@ def _read(line: bytes) -> Report | Receipt:
 
 
 def _complaint(error: ValidationError) -> str:
-    """The first thing that is wrong, without the input itself, which may be long."""
-    first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-    where = ".".join(str(part) for part in first["loc"])
-    return f"{where}: {first['msg']}"[:_MOST_CHARACTERS] if where else first["msg"][:_MOST_CHARACTERS]
+    """What is wrong, without the input itself, which may be long."""
+    told = []
+    for found in error.errors(include_url=False, include_input=False, include_context=False):
+        where = ".".join(str(part) for part in found["loc"])
+        said = complaint(found, field_names())
+        told.append(f"{where}: {said}" if where else said)
+    return "; ".join(told)[:_MOST_CHARACTERS]
 
 
 def _id_of(line: bytes) -> str:

@@ -139,8 +139,12 @@ def _columns(path: str) -> tuple[list[int], dict[str, list[float]]]:
         reader = csv.reader(data.decode("utf-8-sig").splitlines())
         numbered = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
         lines, rows = [number for number, _ in numbered], [row for _, row in numbered]
-    except (OSError, ValueError) as error:  # ValueError: not UTF-8
-        raise BadInput(f"{path}: the calibration cannot be read ({error}); give a CSV file") from error
+    except OSError as error:
+        raise BadInput(
+            f"{path}: the calibration cannot be read ({error.strerror}); give a CSV file"
+        ) from error
+    except UnicodeDecodeError:
+        raise BadInput(f"{path}: the calibration is no text in UTF-8; give a CSV file") from None
     except csv.Error as error:
         raise BadInput(f"{path}: is not CSV: {error}") from error
     names = [name.strip() for name in rows[0]] if rows else []

@@ -15,11 +15,13 @@ from pathlib import Path
 
 from scipy.stats import beta
 
+from service.area.faults import refuse
 from service.errors import BadInput
 
 _THERE = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 _LEAST_IN_STEP = 3  # cases of each kind between two rows of the table: fewer tell a ratio by luck
 _MOST_BYTES = 1 << 26
+_MOST_TOLD = 10  # lines that are wrong
 
 
 @dataclass(frozen=True)
@@ -107,9 +109,14 @@ def read_scored(path: Path) -> list[Scored]:
                 f"'{','.join(reader.fieldnames or ())[:80]}'"
             )
         passes: dict[tuple[str, bool], float | None] = {}
+        wrong: list[str] = []
         for row in reader:
             name = row["pass"] if "pass" in names else str(reader.line_num)
-            one = _scored(f"{path}, line {reader.line_num}", row)
+            try:
+                one = _scored(f"line {reader.line_num}", row)
+            except BadInput as error:
+                wrong.append(str(error))
+                continue
             before = passes.get((name, one.there))
             best = (
                 one.score if before is None else max(before, one.score if one.score is not None else before)
@@ -117,6 +124,9 @@ def read_scored(path: Path) -> list[Scored]:
             passes[name, one.there] = best
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise BadInput(f"{path}: the scored frames cannot be read ({error}); give a CSV file") from error
+    if len(wrong) > _MOST_TOLD:
+        wrong[_MOST_TOLD - 1 :] = [f"and {len(wrong) - _MOST_TOLD + 1} more lines"]
+    refuse(str(path), wrong)
     found = [Scored(there, score) for (_, there), score in passes.items()]
     for kind, words in ((True, "with the target there"), (False, "without the target")):
         if not any(one.there is kind for one in found):
@@ -151,7 +161,9 @@ def _scored(where: str, row: dict[str, str]) -> Scored:
     except ValueError:
         score = math.nan
     if not 0.0 <= score <= 1.0:
+        percent = "; divide per cent by 100" if 1.0 < score <= 100.0 else ""
         raise BadInput(
-            f"{where}: a score lies between 0 and 1, or is left empty where nothing was reported, not '{told[:20]}'"
+            f"{where}: a score lies between 0 and 1, or is left empty where nothing was reported, not "
+            f"'{told[:20]}'{percent}"
         )
     return Scored(there, score)

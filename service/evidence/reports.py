@@ -392,6 +392,12 @@ EXAMPLES: dict[str, dict[str, Any]] = {
 """Reports that the schema shows, by what they say."""
 
 
+def field_names() -> frozenset[str]:
+    """All names that a field has which comes through a door."""
+    fields = [each for model in DoorModel.__subclasses__() for each in model.model_fields.items()]
+    return frozenset(field.alias or name for name, field in fields)
+
+
 def report_schema() -> dict[str, Any]:
     """The schema of a report as JSON Schema (draft 2020-12), with examples."""
     schema = Report.model_json_schema(by_alias=True)

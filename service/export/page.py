@@ -37,6 +37,11 @@ th, td { text-align: left; padding: .25rem .6rem .25rem 0; border-bottom: 1px so
   min-width: 3.5rem; overflow-wrap: break-word; }
 img { max-width: 100%; height: auto; } .small { color: #46525f; font-size: .88rem; }
 .pair { display: flex; flex-wrap: wrap; gap: .5rem; } .pair p { flex: 1 1 20rem; margin: 0; }
+@media screen and (max-width: 40rem) { .cards thead { position: absolute; clip-path: inset(50%); }
+  .cards :is(table, tbody, tr, td) { display: block; }
+  .cards tr { border-bottom: 2px solid #c3cad2; padding: .35rem 0; }
+  .cards td { border: 0; padding: 0; } .cards td:empty { display: none; }
+  .cards td::before { content: attr(data-head) ": "; color: #46525f; } .cards td:first-child { font-weight: 600; } }
 @media print { body { max-width: none; margin: 0; padding: 0; font-size: 10.5pt; } h2 { break-after: avoid; }
   .pair { flex-wrap: nowrap; } .pair p { flex: 1 1 0; min-width: 0; } img, tr { break-inside: avoid; }
   .wide { overflow: visible; } .appendix { break-before: page; } .appendix img { max-width: 60%; } }
@@ -283,11 +288,21 @@ def _words(run: ExportedRun) -> str:
 
 
 def _table(about: str, heads: Sequence[str], rows: Iterable[Sequence[str]], *, head: bool = True) -> str:
-    """A table; on a phone it may be wider than the screen, and is moved by a finger or by arrow keys."""
-    top = "<thead><tr>" + "".join(f'<th scope="col">{_safe(h)}</th>' for h in heads) + "</tr></thead>"
-    body = "".join("<tr>" + "".join(f"<td>{_safe(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    table = f"<table>{top if head else ''}<tbody>{body}</tbody></table>"
-    return f'<div class="wide" role="region" aria-label="{_safe(about)}" tabindex="0">{table}</div>'
+    """A table. With more than two columns it is a list of cards on a phone, and its roles say that it is a table
+    still; what is wider than the screen all the same is moved by a finger or by arrow keys."""
+    top = "".join(f'<th role="columnheader" scope="col">{_safe(each)}</th>' for each in heads)
+    body = "".join(f'<tr role="row">{_cells(heads, row)}</tr>' for row in rows)
+    thead = f'<thead role="rowgroup"><tr role="row">{top}</tr></thead>' if head else ""
+    table = f'<table role="table">{thead}<tbody role="rowgroup">{body}</tbody></table>'
+    kind = "wide cards" if len(heads) > 2 else "wide"
+    return f'<div class="{kind}" role="region" aria-label="{_safe(about)}" tabindex="0">{table}</div>'
+
+
+def _cells(heads: Sequence[str], row: Sequence[str]) -> str:
+    return "".join(
+        f'<td role="cell" data-head="{_safe(head)}">{_safe(cell)}</td>'
+        for head, cell in zip(heads, row, strict=True)
+    )
 
 
 def _more(count: int) -> str:

@@ -17,9 +17,10 @@ from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import Field
 from starlette.middleware.cors import CORSMiddleware
 
+from service.complaint import complaint
 from service.config import MOST_BATCH, HttpSettings
 from service.errors import BadInput
-from service.evidence.reports import EXAMPLES, OrderReceipt, OrderRequest, Receipt, Report
+from service.evidence.reports import EXAMPLES, OrderReceipt, OrderRequest, Receipt, Report, field_names
 from service.http import examples
 from service.http.access import Access
 from service.http.docs import describe_api
@@ -315,7 +316,7 @@ def complaints(error: RequestValidationError) -> list[dict[str, Any]]:
                 continue
             del place[1]
         shown = [part if isinstance(part, int) else _printable(part) for part in place]
-        told.append({"loc": shown, "msg": _printable(found["msg"]), "type": found["type"]})
+        told.append({"loc": shown, "msg": _printable(complaint(found, field_names())), "type": found["type"]})
     return told[:_MOST_COMPLAINTS]
 
 

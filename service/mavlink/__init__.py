@@ -5,6 +5,7 @@ and without a clock of its own), `transports` (the wires), and `autopilots` (wha
 ArduPilot).
 """
 
+from service.mavlink.checking import check_link
 from service.mavlink.errors import CommandFailed, LinkError, NotPermitted, NoVehicle
 from service.mavlink.events import Home
 from service.mavlink.history import PastPose, PoseHistory
@@ -12,7 +13,6 @@ from service.mavlink.modes import ModeKind
 from service.mavlink.settings import MavlinkSettings
 from service.mavlink.signing import read_signing_key
 from service.mavlink.telemetry import Telemetry, Wind
-from service.mavlink.url import check_link
 from service.mavlink.vehicle import Vehicle
 
 __all__ = [

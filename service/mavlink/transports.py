@@ -353,12 +353,7 @@ class SerialTransport(StreamTransport):
         return int(self._port.fileno())
 
     def _open_port(self) -> Any:
-        try:
-            import serial
-        except ImportError as error:
-            raise BadInput(
-                f"the link {self.url} needs pyserial, which is not installed: pip install 'roisearch[serial]'"
-            ) from error
+        serial = pyserial(self.url)
         return serial.Serial(self.url.address, self.url.number, timeout=0, exclusive=True)
 
     def _only_empty(self) -> bool:
@@ -384,6 +379,17 @@ def make_transport(url: LinkUrl) -> Transport:
         LinkKind.SERIAL: SerialTransport,
     }
     return kinds[url.kind](url)
+
+
+def pyserial(url: LinkUrl) -> Any:
+    """The library for serial ports. Raises BadInput when it is not installed."""
+    try:
+        import serial
+    except ImportError as error:
+        raise BadInput(
+            f"the link {url} needs pyserial, which is not installed: pip install 'roisearch[serial]'"
+        ) from error
+    return serial
 
 
 async def _resolve(url: LinkUrl, kind: socket.SocketKind) -> tuple[int, Any]:

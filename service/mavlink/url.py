@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -49,20 +48,6 @@ class LinkUrl:
             f"[{self.address}]" if ":" in self.address and self.kind is not LinkKind.SERIAL else self.address
         )
         return f"{self.kind.value}://{host}:{self.number}"
-
-
-def check_link(text: str) -> LinkUrl:
-    """The address of a link that this installation can open, before anything has been prepared for it.
-
-    Raises:
-        BadInput: as `parse_url`, or it is a serial port and pyserial is missing.
-    """
-    url = parse_url(text)
-    if url.kind is LinkKind.SERIAL and importlib.util.find_spec("serial") is None:
-        raise BadInput(
-            f"the link {url} needs pyserial, which is not installed: pip install 'roisearch[serial]'"
-        )
-    return url
 
 
 def parse_url(text: str) -> LinkUrl:

@@ -64,7 +64,7 @@ from service.mission.news import (
     Order,
     Thought,
 )
-from service.mission.orders import judged, ordered
+from service.mission.orders import judged, ordered, sensible
 from service.mission.phase import (
     Begin,
     Enter,
@@ -262,6 +262,10 @@ class MissionCore:
         if self._phase.waypoint is None:
             return []
         return [here(seen.telemetry), *self.chart.latlons([self._phase.waypoint, *self.path])]
+
+    def orders(self, seen: Situation) -> list[str]:
+        """The orders that would change something now."""
+        return sensible(replace(self._look(), seen=seen))
 
     # ---- wishes
 

@@ -200,6 +200,10 @@ class Mission:
         """Where the aircraft goes from here as decided; empty when it does not."""
         return self.core.ahead(self._outlook.situation())
 
+    def orders(self) -> list[str]:
+        """The orders that would change something now."""
+        return self.core.orders(self._outlook.situation())
+
     # ---- what happens
 
     async def run(self) -> None:

@@ -32,6 +32,8 @@ _SO_ALREADY = {
 FINISHED = "the operator finished the search"
 STOPPING = ("hold", "return", "home", "finish", "abort", "leave")
 """Orders that go out first and are journalled after. What was ordered before one of them counts no more."""
+OFFERED = ("hold", "resume", "return", "launch", "replace", "finish")
+"""Orders that a page has a button for."""
 _MAY_LAUNCH = (State.READY, State.GROUNDED, State.YIELDED, State.HOLDING)
 STICKS = 0.15  # part of their way, from which on deflected sticks are a hand on them
 
@@ -93,6 +95,22 @@ def ordered(order: Order, look: Look) -> Iterator[Wish]:
         yield Answer(order.ticket)
 
 
+def sensible(look: Look) -> list[str]:
+    """The orders that would change something now. What else may be against one is told to whoever gives it."""
+    state, down = look.standing.state, on_ground(look.seen.telemetry)
+    stops = ["hold"] if look.ordered else []  # a launch that gets ready
+    return [
+        each
+        for each in OFFERED
+        if each in stops or not (_senseless(each, state, down) or _is_so(each, state))
+    ]
+
+
+def _is_so(command: str, state: State) -> bool:
+    """Whether an order asks for what is already done; a second finish still ends the search."""
+    return command != "finish" and state in _SO_ALREADY.get(command, ())
+
+
 def judged(word: Judged, look: Look) -> Iterator[Wish]:
     """What follows from an operator's word on a place, which the belief knows by now."""
     standing = look.standing
@@ -114,32 +132,32 @@ def judged(word: Judged, look: Look) -> Iterator[Wish]:
 
 def _refusal(command: str, look: Look) -> str:
     """Why an order cannot be obeyed now, for the person who gave it, or nothing."""
-    state, t = look.standing.state, look.seen.telemetry
-    if command in _EVENTS and state not in _SO_ALREADY[command] and (state, _EVENTS[command]) not in TABLE:
-        return f"there is nothing to {command} in {state}"
-    if command == "resume" and state in (State.YIELDED, State.HOLDING):
-        if on_ground(t):
-            return "the aircraft is on the ground; order launch, or take off and then resume"
-        if (t.sticks or 0.0) > STICKS:
-            return "the pilot's sticks are not in the middle; the pilot has the aircraft"
+    t = look.seen.telemetry
+    if why := _senseless(command, look.standing.state, on_ground(t)):
+        return why
+    taken = look.standing.state in (State.YIELDED, State.HOLDING)
+    if command == "resume" and taken and (t.sticks or 0.0) > STICKS:
+        return "the pilot's sticks are not in the middle; the pilot has the aircraft"
     if command == "launch":
-        if state not in _MAY_LAUNCH or not on_ground(t):
-            return f"a launch is for an aircraft on the ground before its flight; this one is {state}"
         if not look.terms.may_take_off:
             return "this service was not allowed to arm or take off (--takeoff)"
         return look.helm.unfit(t, look.seen.others) or look.helm.too_empty(t, look.seen.others)
-    if command == "replace":
-        return _why_not_replace(look)
+    if command == "replace" and look.heard() and not on_ground(t):
+        return "the aircraft that is heard does not stand on the ground with its motors off"
     return ""
 
 
-def _why_not_replace(look: Look) -> str:
-    """Why no other aircraft can come now, or nothing."""
-    state, t = look.standing.state, look.seen.telemetry
-    if state != State.GROUNDED:
+def _senseless(command: str, state: State, down: bool) -> str:
+    """Why an order means nothing in a state, to an aircraft that stands on the ground with its motors off or does not;
+    or nothing."""
+    if command in _EVENTS and state not in _SO_ALREADY[command] and (state, _EVENTS[command]) not in TABLE:
+        return f"there is nothing to {command} in {state}"
+    if command == "resume" and state in (State.YIELDED, State.HOLDING) and down:
+        return "the aircraft is on the ground; order launch, or take off and then resume"
+    if command == "launch" and (state not in _MAY_LAUNCH or not down):
+        return f"a launch is for an aircraft on the ground before its flight; this one is {state}"
+    if command == "replace" and state != State.GROUNDED:
         return f"another aircraft comes between two sorties, in {State.GROUNDED}; this one is {state}"
-    if look.heard() and not on_ground(t):
-        return "the aircraft that is heard does not stand on the ground with its motors off"
     return ""
 
 

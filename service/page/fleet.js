@@ -1,7 +1,7 @@
 // Several aircraft: a panel for each, with orders of its own. A search with one aircraft has none of this.
 
 import { $, make, say } from "./dom.js";
-import { give, mayGive } from "./orders.js";
+import { give } from "./orders.js";
 
 const ORDERS = ["hold", "resume", "return", "launch", "replace"];
 export const COLOURS = 8; // that style.css has
@@ -74,7 +74,7 @@ function fill(panel, craft, mayOrder) {
   });
   panel.buttons.forEach((button, i) => {
     button.parentElement.hidden = !mayOrder;
-    button.disabled = !mayOrder || !mayGive(ORDERS[i], craft.state);
+    button.disabled = !mayOrder || !craft.orders.includes(ORDERS[i]);
   });
 }
 

@@ -92,7 +92,7 @@ function show(moment) {
   say(chip, live ? state.words : `${state.words} (replay)`);
   chip.dataset.state = state.state;
   showStrip(state);
-  showOrders(several(state) ? state.aircraft.map((each) => each.state) : [state.state], mayOrder);
+  showOrders(several(state) ? state.aircraft.map((each) => each.orders) : [state.orders], mayOrder);
   showFleet(state, mayOrder);
   showPlaces(state, mayOrder);
   showNews(state.news, mayOrder);

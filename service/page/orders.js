@@ -3,16 +3,6 @@
 import { $, placeOf, say } from "./dom.js";
 import { order } from "./link.js";
 
-const FLYING = ["SEARCHING", "CONFIRMING"];
-/** In which states an order may be given. @type {Record<string, string[]>} */
-const MAY = {
-  hold: [...FLYING, "READY", "TAKEOFF", "RETURNING"],
-  launch: ["READY", "GROUNDED", "HOLDING", "YIELDED"],
-  replace: ["GROUNDED"],
-  resume: ["HOLDING", "YIELDED"],
-  return: [...FLYING, "TAKEOFF", "HOLDING", "YIELDED"],
-  finish: [...FLYING, "READY", "TAKEOFF", "HOLDING", "YIELDED", "FOUND", "RETURNING", "GROUNDED"],
-};
 const FOR_ALL = ["hold", "finish"];
 /** What is asked before: title, text, and the button that does it. @type {Record<string, string[]>} */
 const QUESTIONS = {
@@ -63,11 +53,6 @@ export function tell(text) {
   say($("toast"), text);
   clearing = setTimeout(() => say($("toast"), ""), 5000);
 }
-
-/** Whether an order makes sense in a state.
- * @param {string} command
- * @param {string} state */
-export const mayGive = (command, state) => (MAY[command] ?? []).includes(state);
 
 /** Ask; every question has a dialog of its own, since a closed dialog's "close" event may come late, after the next
  * question was opened, and must not answer that one.
@@ -125,18 +110,18 @@ export async function give(command, place = null, aircraft = undefined) {
   }
 }
 
-/** The buttons, of which only those that make sense now can be pressed. Of several aircraft each has its own; then here
- * are those for all of them, and the one that holds them all can always be pressed.
- * @param {string[]} states of all aircraft
+/** The buttons, of which only those that would change something now can be pressed. Of several aircraft each has its
+ * own; then here are those for all of them, and the one that holds them all can always be pressed.
+ * @param {string[][]} orders of all aircraft
  * @param {boolean} mayOrder */
-export function showOrders(states, mayOrder) {
-  const all = states.length > 1;
+export function showOrders(orders, mayOrder) {
+  const all = orders.length > 1;
   for (const button of $("orders").children) {
     const { command } = button.dataset;
-    const sensible = states.some((state) => mayGive(command, state));
+    const sensible = orders.some((each) => each.includes(command));
     const usable = mayOrder && (sensible || (all && command === "hold"));
     if (button.disabled === usable) button.disabled = !usable;
-    if (!states.length) continue; // there is nothing new to say
+    if (!orders.length) continue; // there is nothing new to say
     button.hidden = all && !FOR_ALL.includes(command);
     if (command === "hold") say(button, all ? "Hold all" : "Hold");
   }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from functools import partial
 
 import numpy as np
@@ -160,14 +160,17 @@ class BaseView:
         shown["covered"] = float(footprint.covered.max(initial=0.0))
         return shown
 
-    def next(self, state: State, options: Sequence[Option]) -> NextState:
-        """What happens next, in words."""
+    def next(
+        self, state: State, options: Sequence[Option], causes: Set[str] = frozenset(), *, down: bool = False
+    ) -> NextState:
+        """What happens next, in words: see `next_state`."""
         again = ""
         if state == State.CONFIRMING:  # the place as its card has it
             best = self.search.best()
             place = written((best.lat, best.lon), self.settings.run.coordinates)
             again = f"{place}, {share(best.probability)}"
-        return next_state(state, options, self.names(), self.region_masses(), again)
+        names, regions = self.names(), self.region_masses()
+        return next_state(state, options, names, regions, again, causes=causes, down=down)
 
     def choices(self, options: Sequence[Option]) -> list[ChoiceState]:
         """What the last decision weighed, as places with their names."""

@@ -24,6 +24,7 @@ from service.geometry import LatLon
 from service.known import Withdrawn
 from service.mavlink.modes import mode_title
 from service.mission.mission import Mission
+from service.mission.situation import on_ground
 from service.mission.states import State
 from service.news.request import NewsRequest, refuse_other
 from service.search import Search
@@ -32,7 +33,7 @@ from service.view.base import BaseView, news_states, sortie_states
 from service.view.curve import PosCurve
 from service.view.estimate import Estimator, SearchingAircraft
 from service.view.feed import Moment
-from service.view.next import STATE_WORDS
+from service.view.next import STATE_WORDS, NextState
 from service.view.state import (
     AircraftState,
     DetectorState,
@@ -211,7 +212,8 @@ class RunView(BaseView):
             "state": state,
             "words": STATE_WORDS[state],
             "why": mission.standing.why if mission else "",
-            "next": self.next(state, options),
+            "orders": mission.orders() if mission else [],
+            "next": self.next_of(mission),
             "choices": self.choices(options),
             "area": self.area.name,
             "planner": self.settings.search.planner,
@@ -249,6 +251,13 @@ class RunView(BaseView):
             ],
         }
 
+    def next_of(self, mission: Mission | None) -> NextState:
+        """What one of the aircraft does next; before there is one, what the search does."""
+        if mission is None:
+            return self.next(State.WAITING, ())
+        down = on_ground(mission.vehicle.telemetry)
+        return self.next(mission.state, mission.reason.options, mission.standing.causes, down=down)
+
     def _aircraft(self, name: str, number: int, mission: Mission) -> AircraftState:
         """One of the aircraft, as it is told."""
         t, pose = mission.vehicle.telemetry, pose_of(mission)
@@ -258,6 +267,7 @@ class RunView(BaseView):
             "state": mission.state,
             "words": STATE_WORDS[mission.state],
             "why": mission.standing.why,
+            "orders": mission.orders(),
             "lat": pose.lat if pose else None,
             "lon": pose.lon if pose else None,
             "height": pose.height_m if pose else None,
@@ -265,7 +275,7 @@ class RunView(BaseView):
             "battery": t.battery_percent,
             "link": link_state(mission),
             "mode": mode_title(t.mode) if t.mode else None,
-            "next": self.next(mission.state, mission.reason.options),
+            "next": self.next_of(mission),
             "ahead": mission.ahead(),
             "steps": mission.flight.steps,
             "flight_time_s": mission.flight_time(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 from typing_extensions import TypedDict  # what pydantic can read on Python 3.11
 
@@ -39,6 +39,16 @@ _NEXT = {
     State.ABORTED: "The search is over",
 }
 
+_PASSES = {
+    "apart": "the aircraft are apart",
+    "detector": "the detector reports",
+    "ground": "it is clear of the ground",
+    "journal": "the journal is written",
+    "link": "the autopilot is heard",
+    "position": "the position is good",
+}
+"""What a hold waits for that ends by itself; others only a person ends."""
+
 
 class NextState(TypedDict):
     """What happens next: one sentence, and where it goes, if it goes anywhere: the place's name, the metres to it when
@@ -60,7 +70,14 @@ class ChoiceState(TypedDict):
 
 
 def next_state(
-    state: State, options: Sequence[Option], names: Sequence[str], regions: Sequence[float], again: str = ""
+    state: State,
+    options: Sequence[Option],
+    names: Sequence[str],
+    regions: Sequence[float],
+    again: str = "",
+    *,
+    causes: Set[str] = frozenset(),
+    down: bool = False,
 ) -> NextState:
     """What happens next.
 
@@ -70,9 +87,11 @@ def next_state(
         names: what people call the regions of interest, region 1 first.
         regions: the probability of each now.
         again: the place that gets another look while it is confirming, in words.
+        causes: what it holds still for (`Standing.causes`).
+        down: it stands on the ground with its motors off.
     """
     if state not in FLYING:
-        return {"words": _NEXT[state], "name": None, "distance_m": None, "probability": None}
+        return {"words": _still(state, causes, down), "name": None, "distance_m": None, "probability": None}
     chosen = next((each for each in choices(options, names, regions) if each["chosen"]), None)
     if chosen is None:
         words = "Next: the ground ahead"
@@ -81,6 +100,17 @@ def next_state(
     if state == State.CONFIRMING:
         words = f"Next: another look at {again or described(chosen)}"
     return {"words": words, **{key: chosen[key] for key in ("name", "distance_m", "probability")}}  # type: ignore[typeddict-item]
+
+
+def _still(state: State, causes: Set[str], down: bool) -> str:
+    """What happens next while nothing is searched."""
+    if down and state in (State.HOLDING, State.YIELDED):
+        return "Next: nothing until you say Launch"
+    if state == State.HOLDING and causes and causes <= _PASSES.keys():
+        return (
+            f"Next: it goes on by itself when {' and '.join(_PASSES[each] for each in sorted(causes))} again"
+        )
+    return _NEXT[state]
 
 
 def choices(options: Sequence[Option], names: Sequence[str], regions: Sequence[float]) -> list[ChoiceState]:

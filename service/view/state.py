@@ -209,6 +209,7 @@ class AircraftState(TypedDict):
     state: State
     words: str
     why: str
+    orders: list[str]
     lat: float | None
     lon: float | None
     height: float | None
@@ -233,14 +234,16 @@ class RunState(TypedDict):
     cells flown; `reason` and `options` are the last decision's, `ahead` the way from here as decided.
     `battery_doubt` says what is reckoned when the battery's level is not told (any longer). `flight_time_s` goes on
     over all processes and all `sorties` of a run; these are told when they are over. `words` is the state for
-    people, `next` what happens next and `choices` what was weighed for it, with the area file's names;
-    `height_above_ground_m` is over the height model, or over home where the ground is taken as flat.
+    people, `orders` are those that would change something now (none in a replay), `next` is what happens next and
+    `choices` what was weighed for it, with the area file's names; `height_above_ground_m` is over the height model, or
+    over home where the ground is taken as flat.
     `aircraft` are all that fly; what else is told of an aircraft is of the first that has not ended.
     """
 
     state: State
     words: str
     why: str
+    orders: list[str]
     next: NextState
     choices: list[ChoiceState]
     area: str

@@ -30,6 +30,7 @@ from service.view.live import RunView
 from service.view.next import STATE_WORDS, choices, next_state
 from service.view.state import RunState
 from tests.service.http.door import FakeRun, settings
+from tests.service.mission.flown import ON_GROUND, reached
 
 from .stage import Watch
 
@@ -43,6 +44,14 @@ JPEG = bytes.fromhex(
 )
 """One grey pixel."""
 PHONE_FIX, RUIN = (56.609142, -4.739255), (56.609643, -4.744307)
+
+
+def orders(state: State) -> list[str]:
+    """What may be ordered in a state, of an aircraft in the air but for GROUNDED."""
+    talk = reached(state)
+    if state == State.GROUNDED:
+        talk.shows(**ON_GROUND)
+    return talk.core.orders(talk.seen)
 
 
 class Scripted(FakeRun):
@@ -81,7 +90,7 @@ class Scripted(FakeRun):
             Option("region 2", 2, 4, 0.1, 0.3, 120.0, False, ""),
         ]
         self.tell(
-            state=state, words=STATE_WORDS[state], why=why,
+            state=state, words=STATE_WORDS[state], why=why, orders=orders(state),
             next=next_state(state, weighed, names, regions), choices=choices(weighed, names, regions),
         )  # fmt: skip
 

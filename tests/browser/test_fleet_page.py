@@ -15,7 +15,7 @@ from service.view.next import STATE_WORDS
 from tests.service.http.door import REPORT, both_tokens
 
 from .hands import PHONE
-from .scripted import PHONE_FIX, RUIN, Scripted, Served, served
+from .scripted import PHONE_FIX, RUIN, Scripted, Served, orders, served
 from .stage import Watch
 
 pytestmark = pytest.mark.timeout(300)
@@ -27,6 +27,7 @@ def craft(search: Scripted, number: int, state: State, **changes: Any) -> dict[s
     lat, lon = PLACES[number - 1]
     usual = {
         "name": str(number), "colour": number - 1, "state": state, "words": STATE_WORDS[state], "why": "",
+        "orders": orders(state),
         "lat": lat, "lon": lon, "height": 20.0 + 10.0 * number, "heading_deg": 90.0 * number, "battery": 90.0 - number,
         "link": {"up": True, "silent_s": 0.2, "received": 0.99}, "mode": "AUTO_LOITER", "next": search.now["next"],
         "ahead": [(lat, lon), PHONE_FIX if number < 3 else RUIN], "steps": 3, "flight_time_s": 60.0,

@@ -39,6 +39,9 @@ def test_axe_finds_nothing_in_a_report_and_it_is_no_wider_than_the_screen(
     watch = Watch(chromium, pages[name].as_uri(), **options)
     assert watch.violations() == []
     assert watch.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    tables = watch.page.locator(".wide")
+    assert tables.evaluate_all("(all) => all.every((each) => each.scrollWidth <= each.clientWidth)")
+    assert tables.get_by_role("row").count() > 10
     watch.page.emulate_media(media="print")
     assert watch.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     watch.close()

@@ -98,6 +98,9 @@ def test_every_state_has_its_words_and_none_of_the_tools(state: State, watch: Wa
     expect(card(watch, RUIN).get_by_role("button", name="Confirm")).to_be_enabled()
     expect(card(watch, RUIN).get_by_role("button", name="Reject")).to_be_enabled()
     page = watch.page
+    for button in page.locator("#orders button").all():
+        meant = button.get_attribute("data-command") in search.run.now["orders"]
+        expect(button).to_be_enabled() if meant else expect(button).to_be_disabled()
     page.locator("details").evaluate_all("(all) => all.forEach((each) => (each.open = true))")
     watch.says_it_in_words()
     assert state not in page.locator("body").inner_text()
@@ -329,8 +332,8 @@ def test_news_get_their_place_by_keys_alone(keys: Keyboard, search: Served) -> N
     press("ArrowUp")
     press("Enter")
     expect(page.locator("#news-metres")).to_be_focused()
-    place = coordinates_of(keys.watch).inner_text()
-    assert f"{page.locator('#news-lat').input_value()}, {page.locator('#news-lon').input_value()}" == place
+    taken = [page.locator(f"#news-{which}").input_value() for which in ("lat", "lon")]
+    expect(coordinates_of(keys.watch)).to_have_text(", ".join(taken))
 
 
 def test_the_map_has_two_views_names_from_the_file_and_north(watch: Watch) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
-import importlib.util
 import socket
 import subprocess
 import sys
@@ -83,6 +82,10 @@ def test_neither_area_nor_run_is_one_clear_line(capsys: pytest.CaptureFixture[st
         ("udpp://1.2.3.4:5", "udpp"),
         ("udpin://0.0.0.0", "port"),
         ("serial:///dev/ttyACM0:57600", "pip install 'roisearch[serial]'"),
+        ("serial:///dev/no-such-port:57600", "serial:///dev/no-such-port:57600: there is no such device; "),
+        ("serial:///etc/hostname:57600", "this is no serial device"),
+        ("udpout://no.such.host.invalid:14550", "the host 'no.such.host.invalid' is not known"),
+        ("udpin://127.0.0.1:TAKEN", "Address already in use"),
     ],
 )
 def test_a_link_that_cannot_be_is_told_before_anything_is_compiled(
@@ -92,12 +95,13 @@ def test_a_link_that_cannot_be_is_told_before_anything_is_compiled(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    real = importlib.util.find_spec
-    monkeypatch.setattr(
-        "importlib.util.find_spec", lambda name, *more: None if name == "serial" else real(name, *more)
-    )
-    arguments = ["--area", "config/area.geojson", "--connect", url, "--runs", str(tmp_path / "runs")]
-    assert main([*arguments, "--http", "127.0.0.1:0"]) == 2
+    if "pip install" in words:
+        monkeypatch.setitem(sys.modules, "serial", None)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        link = url.replace("TAKEN", str(taken.getsockname()[1]))
+        arguments = ["--area", "config/area.geojson", "--connect", link, "--runs", str(tmp_path / "runs")]
+        assert main([*arguments, "--http", "127.0.0.1:0"]) == 2
     said = capsys.readouterr()
     assert words in said.err
     assert "compil" not in said.out

@@ -113,12 +113,43 @@ def test_config_check_names_every_wrong_line_and_key(
     assert "http.allowed_hosts" in said[2]
 
 
-def test_config_check_names_who_cannot_be_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "wrong.toml"
-    file.write_text('[telling]\ntak = "tcp:/x"\n')
-    assert service_main(["config", "check", str(file)]) == 2
-    (said,) = capsys.readouterr().err.splitlines()
-    assert "telling.tak = 'tcp:/x' is no TAK address; give tcp://HOST:8087" in said
+def test_config_check_names_all_that_a_run_would_refuse(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Addresses that are none and files that are not there; without opening any, and with what would be right."""
+    monkeypatch.chdir(tmp_path)
+    wrong = {
+        "telling": {"webhook": "chat", "mqtt": "x://y", "tak": "tcp:/x"},
+        "sensor": {"calibration_file": "none.csv"},
+        "link": {"connect": "serial:///dev/ttyACM0", "signing_key_file": "none.key"},
+        "http": {"listen": "everywhere", "token_file": "none.token"},
+        "doors": {"udp": "14600", "mqtt": "broker"},
+        "ground": {"file": "dem.tif", "cover_file": "cover.tif", "mobility_file": "mobility.tif"},
+        "page": {"tiles_url": "https://tiles.example.org"},
+    }
+    lines = [
+        line
+        for table, keys in wrong.items()
+        for line in (f"[{table}]", *(f'{k} = "{v}"' for k, v in keys.items()))
+    ]
+    Path("wrong.toml").write_text("\n".join(lines))
+    assert service_main(["config", "check", "wrong.toml"]) == 2
+    said = dict(line.split(": ", 1) for line in capsys.readouterr().err.splitlines())
+    given = [f"wrong.toml:{number}" for number, line in enumerate(lines, 1) if not line.startswith("[")]
+    assert sorted(said) == sorted(given)
+    for line, words in zip(given, ["https://HOST/PATH", "mqtt://HOST", "tls://HOST:8089"], strict=False):
+        assert words in said[line]
+
+
+def test_config_check_takes_what_another_computer_will_have(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "right.toml"
+    file.write_text(
+        '[link]\nconnect = "serial:///dev/ttyACM9:921600"\n[http]\nlisten = "0.0.0.0:8080"\n[telling]\ntak = "tcp://tak:8087"\n'
+    )
+    assert service_main(["config", "check", str(file)]) == 0
+    assert "nothing is wrong" in capsys.readouterr().out
 
 
 def test_config_check_tells_where_each_setting_comes_from(

@@ -6,6 +6,7 @@ It knows no polygons: a track that comes back to its start is one.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import gpxpy
@@ -44,10 +45,25 @@ def read_gpx(text: str, where: Where) -> Document:
         )
     for number, track in enumerate(gpx.tracks):
         called = label("track", number, track.name or "")
-        for part, segment in enumerate(track.segments):
-            own = called if len(track.segments) == 1 else f"{called}, part {part}"
-            _add(document, own, track, [_position(each) for each in segment.points])
+        pieces = [[_position(each) for each in segment.points] for segment in track.segments]
+        for own, positions in _lines(document, called, track, [each for each in pieces if each]):
+            _add(document, own, track, positions)
     return document
+
+
+def _lines(
+    document: Document, called: str, track: Any, pieces: list[list[list[float]]]
+) -> Iterator[tuple[str, list[list[float]]]]:
+    """The lines of a track with their labels. A receiver begins a new piece where it had no fix for a while: pieces
+    that go around ground only together are one line."""
+    whole, name = [each for piece in pieces for each in piece], one_line(track.name or "")
+    around = [outline(positions, name, always=True) is not None for positions in (*pieces, whole)]
+    if len(pieces) > 1 and around[-1] and not any(around[:-1]):
+        document.notes.append(f"{called}: its {len(pieces)} parts are taken as one, which goes around ground")
+        yield called, whole
+        return
+    for part, positions in enumerate(pieces, 1):
+        yield called if len(pieces) == 1 else f"{called}, part {part}", positions
 
 
 def _add(document: Document, called: str, thing: Any, positions: list[list[float]]) -> None:

@@ -88,18 +88,19 @@ def _take(document: Document, feature: Any, number: int, folder: str) -> None:
     if kind != "Placemark":
         document.notes.append(f"{called}: left out, it marks no place")
         return
-    if feature.geometry is None:
+    geometry = _geometry(feature)
+    if geometry is None:
         document.notes.append(f"{called}: left out, it has no geometry that can be read")
         return
     ours = {key: value for key, value in columns.items() if key in OURS}
     said = {**ours, **settings_in(feature.description or "")}
     hints = (short_text(feature.description), folder)
     try:
-        parts = simple_parts(_lists(feature.geometry.__geo_interface__), Where("", called))
+        parts = simple_parts(geometry, Where("", called))
     except BadInput as error:
         document.faults.append(str(error).removeprefix(": "))
         return
-    for index, part in enumerate(parts):
+    for index, part in enumerate(parts, 1):
         if part["type"] == "LinearRing":
             part = {"type": "Polygon", "coordinates": [part["coordinates"]]}
         elif part["type"] == "LineString" and "role" not in said:
@@ -117,6 +118,15 @@ def _extended(feature: Any) -> Json:
         elif isinstance(element, SchemaData):
             found.update({str(each.name): each.value for each in element.data})
     return typed({key: value for key, value in spelt(found).items() if value not in (None, "")})
+
+
+def _geometry(feature: Any) -> Json | None:
+    """Where a placemark is; None where it says nothing that can be read, as a gx:Track without times."""
+    try:
+        made: Json = _lists(feature.geometry.__geo_interface__)
+    except (AttributeError, TypeError, ValueError):
+        return None
+    return made
 
 
 def _lists(value: Any) -> Any:

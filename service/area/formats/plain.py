@@ -50,8 +50,8 @@ def read_plain(root: Json, where: Where) -> Document:
     elif isinstance(kind, str) and kind in GEOMETRY_TYPES:
         take_feature(document, {"type": "Feature", "geometry": root}, "the geometry")
     elif "groundStation" in root or "geometryType" in root:
-        what = "an old plan of QGroundControl" if "groundStation" in root else "Esri's own JSON"
-        raise where.bad(f"this is {what}; save it again as a .plan or as GeoJSON")
+        old = "this is an old plan of QGroundControl; save it again as a .plan"
+        raise where.bad(old if "groundStation" in root else "this is Esri's own JSON; export it as GeoJSON")
     else:
         raise where.bad(f"not GeoJSON: 'type' is {quote(kind)}; give a FeatureCollection, Feature or Polygon")
     return document
@@ -72,6 +72,9 @@ def label_of(index: int, feature: object) -> str:
 def take_feature(document: Document, feature: object, label: str) -> None:
     """Add the items of one feature; what is wrong with it becomes a fault."""
     here = Where("", label)
+    if feature is None:
+        document.notes.append(f"{label}: left out, it is empty")
+        return
     try:
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
             raise here.bad('not a GeoJSON Feature; each item of \'features\' needs "type": "Feature"')
@@ -92,7 +95,7 @@ def take_feature(document: Document, feature: object, label: str) -> None:
             one_line(said[key]) for key in ("name", "title") if isinstance(said.get(key), str | int)
         )
         parts = simple_parts(geometry, here)
-        for number, part in enumerate(parts):
+        for number, part in enumerate(parts, 1):
             check_crs(part, here)
             name = label if len(parts) == 1 else f"{label}, part {number}"
             document.items.append(Item(name, part, share_of(said, len(parts)), words))

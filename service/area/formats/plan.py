@@ -42,7 +42,7 @@ def read_plan(root: Json, where: Where) -> Document:
     rally = root.get("rallyPoints")
     points = rally.get("points") if isinstance(rally, dict) else None
     if isinstance(points, list) and points:
-        document.notes.append(f"{len(points)} rally points: left out, the aircraft lands where it started")
+        document.notes.append(f"rally points ({len(points)}): left out, the aircraft lands where it started")
     return document
 
 
@@ -64,7 +64,7 @@ def _take_items(document: Document, items: list[Any]) -> None:
         else:
             simple += 1
     if simple:
-        document.notes.append(f"{simple} waypoints and commands: left out, the search finds its own way")
+        document.notes.append(f"waypoints and commands ({simple}): left out, the search finds its own way")
 
 
 def _take_fence(document: Document, fence: Json, surveyed: bool) -> None:

@@ -164,6 +164,16 @@ def test_area_check_tells_what_was_understood_and_writes_it(
     assert main(["area", "check", str(out)]) == 0
 
 
+def test_area_check_does_not_write_over_the_file_that_it_reads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    teams = tmp_path / "caltopo.json"
+    teams.write_bytes(before := (EXPORTS / "caltopo.json").read_bytes())
+    assert main(["area", "check", str(teams), "--out", str(tmp_path / "." / "caltopo.json")]) == 2
+    assert "--out is the file itself, which is left as it is; give another one" in capsys.readouterr().err
+    assert teams.read_bytes() == before
+
+
 def test_area_check_writes_places_as_the_team_does(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

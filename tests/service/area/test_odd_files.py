@@ -388,3 +388,52 @@ def test_a_circle_without_a_radius_is_a_fault_and_not_forgotten() -> None:
 
 def test_what_lies_in_many_folders_is_not_lost() -> None:
     assert not read(kml("<Folder>" * 60 + mark("area", ground(FIELD)) + "</Folder>" * 60)).ground.is_empty
+
+
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        "<gx:Track><gx:coord>11 47 500</gx:coord><gx:coord>11.001 47 500</gx:coord></gx:Track>",
+        "<gx:Track/>",
+        "<gx:MultiTrack><gx:Track><when>2026-05-01T08:00:00Z</when></gx:Track></gx:MultiTrack>",
+        "<MultiGeometry/>",
+    ],
+)
+def test_a_placemark_that_cannot_be_read_does_not_take_the_others_with_it(geometry: str) -> None:
+    root = 'xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2"'
+    area = read(kml(mark("field", ground(FIELD)) + mark("walked", geometry), root))
+    assert noted(area, 'placemark 2 ("walked"): left out, it has no geometry that can be read')
+
+
+def test_a_track_that_was_interrupted_goes_around_as_a_whole() -> None:
+    pieces = "".join(
+        "<trkseg>{}</trkseg>".format("".join(f'<trkpt lat="{lat}" lon="{lon}"/>' for lon, lat in piece))
+        for piece in (FIELD[:2], [], FIELD[2:])
+    )
+    area = read(gpx(f"<trk><name>perimeter</name>{pieces}</trk>"))
+    assert noted(area, 'track 1 ("perimeter"): its 2 parts are taken as one')
+    assert area.ground.equals(parse(polygon(FIELD)).ground)
+
+
+@pytest.mark.parametrize("rings", [[FIELD[:-1]], [FIELD, FARM[:-1]]])
+def test_a_ring_that_does_not_come_back_is_closed(rings: list[Any]) -> None:
+    area = parse(polygon(*rings))
+    assert noted(area, "does not come back to its start; it is closed")
+    assert area.ground.equals(parse(polygon(*([*ring[:-1], *ring[-1:], ring[0]] for ring in rings))).ground)
+
+
+def test_parts_are_counted_as_people_count() -> None:
+    both = {"type": "GeometryCollection", "geometries": [polygon(FIELD), point(at(0, 0))]}
+    area = parse(collection(feature(both, name="LKP")))
+    assert noted(area, 'features[0] ("LKP"), part 2: taken as a prior')
+
+
+def test_whoever_has_only_points_is_told_how_ground_is_drawn_in_that_kind_of_file() -> None:
+    with pytest.raises(BadInput, match=r"make a track or route that comes back to its start, or .*plan'"):
+        read(gpx('<wpt lat="47" lon="11"><name>LKP</name></wpt>'))
+    with pytest.raises(BadInput, match="draw a survey or an inclusion fence"):
+        read(plan())
+
+
+def test_an_empty_place_in_a_list_of_features_is_a_note() -> None:
+    assert noted(parse({**collection(feature(polygon(FIELD)), None)}), "features[1]: left out, it is empty")

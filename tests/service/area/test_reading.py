@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.area import PointPrior, PolygonPrior, parse_area, read_area
+from service.area import BadArea, PointPrior, PolygonPrior, parse_area, read_area
 from service.errors import BadInput
 from tests.service.area.files import at, box, collection, feature, parse, point, polygon, ring, square
 
@@ -255,11 +255,6 @@ REFUSED: dict[str, tuple[Any, tuple[str, ...]]] = {
         polygon(BOX, box(300, 300, 400, 400)),
         (SEARCH, "not valid (hole lies outside shell) at [11.00", "draw it again"),
     ),
-    "not closed": (
-        polygon(BOX[:-1]),
-        (SEARCH, "the outer ring is not closed: it starts at [10.99", "repeat the first position at the end"),
-    ),
-    "hole not closed": (polygon(BOX, box(-9, -9, 9, 9)[:-1]), (SEARCH, "hole 1 is not closed")),
     "two corners": (
         polygon([BOX[0], BOX[1], BOX[0]]),
         (SEARCH, "the outer ring has 3 positions; give at least 4"),
@@ -345,7 +340,11 @@ REFUSED: dict[str, tuple[Any, tuple[str, ...]]] = {
     ),
     "launch swapped": (
         collection(square(), feature(point(at(0, 0)[::-1]), role="launch")),
-        (SECOND, "the launch point is", "swap longitude and latitude"),
+        (SECOND, "the launch point is", "longitude and latitude are swapped, either here or in the area"),
+    ),
+    "prior swapped": (
+        collection(square(), feature(point(at(0, 0)[::-1]), role="prior", sigma_m=50)),
+        (SECOND, "lies entirely outside", "longitude and latitude are swapped, either here or in the area"),
     ),
     "outside one": (
         collection(feature(polygon(BOX), outside=1)),
@@ -443,3 +442,33 @@ def test_half_of_a_character_is_refused_before_the_flight_not_when_the_report_is
     assert "half of a character" in refusal(lambda: parse_area(data, source="a.geojson"))
     whole = json.dumps({**collection(feature(polygon(BOX))), "name": "\U0001f6a9"}).encode()
     assert parse_area(whole, source="a.geojson").name == "\U0001f6a9"
+
+
+def faults_of(*features: Any) -> list[str]:
+    with pytest.raises(BadArea) as caught:
+        parse(collection(*features))
+    return list(caught.value.faults)
+
+
+def test_all_that_is_wrong_with_a_feature_is_told_at_once() -> None:
+    bad = feature(point(["east", 47]), role="prior", sigma_m="wide", wieght=-2, outside=0.1)
+    assert faults_of(square(), bad) == [
+        "features[1]: it has no property \"wieght\" that is known; did you mean 'weight'?",
+        "features[1]: 'outside' belongs to the search area; move it to the feature with the role 'search'.",
+        "features[1]: weight is -2; give a finite number greater than 0.",
+        'features[1]: sigma_m is "wide"; give a finite number greater than 0.',
+        'features[1]: ["east", 47] is not a position; write two numbers, [longitude, latitude].',
+    ]
+
+
+def test_a_misspelt_property_is_not_missed_as_well() -> None:
+    said = refusal(lambda: parse(collection(square(), feature(point(at(0, 0)), role="prior", sigma=50))))
+    assert said.endswith("it has no property \"sigma\" that is known; did you mean 'sigma_m'?")
+
+
+def test_what_lies_too_far_away_is_told_beside_other_faults_where_the_area_is_understood() -> None:
+    away = feature(point(at(9000, 0)), role="launch")
+    bad = feature(point(at(0, 0)), role="prior")
+    assert [fault[:11] for fault in faults_of(square(), bad, away)] == ["features[1]", "features[2]"]
+    unclear = feature(polygon(BOWTIE), role="search")  # the launch point may be near this one
+    assert "features[1]" in refusal(lambda: parse(collection(square(), unclear, away)))

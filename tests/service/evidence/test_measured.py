@@ -76,7 +76,12 @@ def test_frames_of_one_pass_count_once_by_their_best_score(tmp_path: Path) -> No
     [
         ("score,truth\n0.5,1\n", "'score,there'"),
         ("score,there\n0.5,maybe\n", "line 2: there is 1 or 0"),
-        ("score,there\n87,1\n", "line 2: a score lies between 0 and 1"),
+        ("score,there\n87,1\n", "line 2: a score lies between 0 and 1.*not '87'; divide per cent by 100"),
+        (
+            "score,there\n1.5,1\n,0\nx,perhaps\n",
+            r"2 things are wrong:\n  line 2: a score .*\n  line 4: there is 1",
+        ),
+        ("score,there\n" + "87,1\n" * 40, r"line 10: .*\n  and 31 more lines$"),
         ("score,there\n0.5,1\n", "no pass without the target"),
         ("score,there\n,0\n", "no pass with the target there"),
         ("", "the first line names"),

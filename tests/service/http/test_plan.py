@@ -20,6 +20,8 @@ from tests.service.area.files import box, collection, feature, polygon
 
 from .door import TOKENS, bearer
 
+EXPORTS = Path(__file__).parents[1] / "area" / "exports"
+
 FIELD = collection(feature(polygon(box(0, 0, 300, 200)), name="field"))
 
 
@@ -84,3 +86,11 @@ def test_what_cannot_be_saved_or_drawn_on_is_refused_before_anybody_draws(
     assert main([*words, str(tmp_path / "notes.txt")]) == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert "notes.txt" in said
+    teams = tmp_path / "team.kml"
+    teams.write_bytes(before := (EXPORTS / "google-earth.kml").read_bytes())
+    assert main([*words, str(teams)]) == 2
+    assert (
+        "this is KML, and what is saved here is GeoJSON, which would take its place; make a file"
+        in capsys.readouterr().err
+    )
+    assert teams.read_bytes() == before

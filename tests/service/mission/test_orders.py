@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import pytest
 
 from service.mission.effects import Answer, DropAction, EnterGuided, Stop, Tell
 from service.mission.news import Order
-from service.mission.orders import ASKED, SIGNAL
+from service.mission.orders import ASKED, OFFERED, SIGNAL
 from service.mission.states import TABLE, Event, State
 from service.rows import TransitionRow
-from tests.service.mission.flown import LEFT_US, reached
+from tests.service.mission.flown import LEFT_US, ON_GROUND, reached
 
 SO_ALREADY = {
     (State.HOLDING, "hold"),
@@ -128,3 +131,39 @@ def test_ending_the_process_says_nothing_about_the_search() -> None:
     row = TransitionRow(State.YIELDED, Event.ABORT, State.ABORTED, SIGNAL)
     assert row in talk.rows
     assert SIGNAL != ASKED  # which is what a run that is over is known by
+
+
+@pytest.mark.parametrize("changes", [{}, ON_GROUND], ids=["in the air", "on the ground"])
+@pytest.mark.parametrize("state", list(State))
+def test_what_is_offered_is_what_is_not_refused_as_meaning_nothing(
+    state: State, changes: dict[str, Any]
+) -> None:
+    talk = reached(state)
+    talk.shows(**changes)
+    offered = talk.core.orders(talk.seen)
+    for command in OFFERED:
+        asked = reached(state)
+        asked.shows(**changes)
+        refused = next((each.refused for each in asked.on(Order(command, 7)) if isinstance(each, Answer)), "")
+        senseless = re.match("there is nothing|a launch is for|another aircraft|the aircraft is on", refused)
+        assert (command in offered) == (senseless is None and (state, command) not in SO_ALREADY), command
+
+
+@pytest.mark.parametrize(
+    ("state", "changes", "offered"),
+    [
+        (State.HOLDING, {}, ["resume", "return", "finish"]),
+        (State.HOLDING, ON_GROUND, ["return", "launch", "finish"]),
+        (State.YIELDED, {}, ["resume", "return", "finish"]),
+        (State.YIELDED, ON_GROUND, ["return", "launch", "finish"]),
+        (State.FOUND, {}, ["hold", "return", "finish"]),
+        (State.GROUNDED, ON_GROUND, ["launch", "replace", "finish"]),
+        (State.DONE, ON_GROUND, []),
+    ],
+)
+def test_what_is_offered_goes_by_the_state_and_by_whether_it_flies(
+    state: State, changes: dict[str, Any], offered: list[str]
+) -> None:
+    talk = reached(state)
+    talk.shows(**changes)
+    assert talk.core.orders(talk.seen) == offered

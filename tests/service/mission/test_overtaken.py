@@ -37,6 +37,7 @@ def test_a_hold_while_a_launch_gets_ready_keeps_the_aircraft_on_the_ground(state
     talk = on_the_ground(state)
     talk.on(Order("launch", 7))
     assert (talk.state, talk.doing()) == (state, WaitReady())
+    assert "hold" in talk.core.orders(talk.seen)
     did = talk.on(Order("hold", 8))
     assert DropAction() in did
     assert Rest() in did

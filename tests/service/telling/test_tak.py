@@ -89,7 +89,21 @@ def test_a_client_library_reads_every_event(data: bytes) -> None:
     assert (event.lat, event.lon) == pytest.approx(
         tuple(float(root[0].attrib[key]) for key in ("lat", "lon"))
     )
-    assert event.staleTime > event.sendTime
+    assert (event.sendTime, event.startTime, event.staleTime) == tuple(
+        pytest.approx(1000.0 * datetime.fromisoformat(root.attrib[key]).timestamp(), abs=1.0)
+        for key in ("time", "start", "stale")
+    )
+    known = {"contact": ["callsign"], "status": ["battery"], "track": ["course"]}
+    for tag, names in known.items():  # what else there is it hands on as XML
+        said = root.find(f"detail/{tag}")
+        assert event.detail.HasField(tag) == (said is not None)
+        for name in names if said is not None else ():
+            value = getattr(getattr(event.detail, tag), name)
+            assert value == (
+                pytest.approx(float(said.attrib[name])) if tag != "contact" else said.attrib[name]
+            )
+    rest = ET.fromstring(f"<rest>{event.detail.xmlDetail}</rest>")
+    assert [child.tag for child in rest] == [child.tag for child in root[1] if child.tag not in known]
 
 
 def test_events_say_what_there_is() -> None:

@@ -70,3 +70,26 @@ def test_every_state_has_words_and_a_next_step_without_the_tools_own_words() -> 
     for state in State:
         said = STATE_WORDS[state] + next_state(state, [option(1, chosen=True)], NAMES, REGIONS)["words"]
         assert not any(word in said.lower() for word in ("roi", "mass", "visits", "footprint", "index"))
+
+
+@pytest.mark.parametrize(
+    ("state", "causes", "down", "words"),
+    [
+        (State.HOLDING, {"operator"}, False, "nothing until you say Resume or Return"),
+        (State.HOLDING, {"detector"}, False, "it goes on by itself when the detector reports again"),
+        (
+            State.HOLDING,
+            {"position", "link"},
+            False,
+            "it goes on by itself when the autopilot is heard and the position is good again",
+        ),
+        (State.HOLDING, {"detector", "operator"}, False, "nothing until you say Resume or Return"),
+        (State.HOLDING, {"detector"}, True, "nothing until you say Launch"),
+        (State.YIELDED, set(), True, "nothing until you say Launch"),
+        (State.YIELDED, set(), False, "nothing until the pilot hands over and you say Resume"),
+    ],
+)
+def test_what_ends_by_itself_asks_for_no_order(
+    state: State, causes: set[str], down: bool, words: str
+) -> None:
+    assert next_state(state, [], NAMES, REGIONS, causes=causes, down=down)["words"] == f"Next: {words}"

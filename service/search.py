@@ -121,6 +121,7 @@ class Search:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
         self._school = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._learning: Future[None] | None = None
+        self._expected_s: float | None = None  # seconds to the first detection, by the last decision
         self._rng = np.random.default_rng(settings.run.seed)
         self.common.new_ground.append(self._fly_on)
         self.common.new_drawing.append(self._redraw)
@@ -431,7 +432,23 @@ class Search:
         near = left is not None and left.spare_s <= self.settings.search.battery_end_s
         endurance = self.reach.endurance(left) if left is not None and known and near else None
         deadline = self.settings.search.deadline_s
-        return self.ending.plan(thought, state, self._rng, deadline_s=deadline, endurance=endurance)
+        decision = self.ending.plan(thought, state, self._rng, deadline_s=deadline, endurance=endurance)
+        self._expected_s = -decision.value if isinstance(self.planner, InSeconds) else None
+        return decision
+
+    def pays_to_hover(self, cells: Sequence[Cell]) -> bool:
+        """Whether to look at one of these cells again now, hovering, since something was reported there.
+
+        What was seen of a target that walks does not keep: it is somewhere else when the aircraft comes by again. So
+        another look pays where its chance is worth the time that it takes, in seconds until the target is detected. Of
+        one that stands still nothing is lost by going on, and it is looked at again when that is on the way.
+        """
+        if self.grid.walk is None or self._expected_s is None:
+            return False
+        took_s = self.settings.sensor.hover_look_s + self.motion.corner_seconds(180)
+        least = took_s / max(took_s, self._expected_s) / float(self.fov.p_tp[0]) * self.belief.total
+        hit = [cell for cell in cells if self.sightings.near(cell)]
+        return bool(hit) and float(self.belief.mass_at(np.array(hit)).max()) >= least
 
     def arrivals(
         self, path: Sequence[Cell], start: Cell, heading: str = "north", speed_mps: float = 0.0

@@ -57,18 +57,23 @@ class Outlook:
             place_in_sight=search.place_in_sight if looks else True,
             found=search.found() if looks else None,
             confirmed=search.confirmed is not None,
-            suspect_in_view=standing.state == State.CONFIRMING and self._suspect_in_view(),
+            suspect_in_view=self._suspect_in_view(),
             others=self.formation.others(search.aircraft),
             over=search.over() if self.formation.several else "",
         )
 
     def _suspect_in_view(self) -> bool:
+        """A frame taken now is another look at what is worth one at once."""
+        state, search = self.core.standing.state, self.search
+        confirming = state == State.CONFIRMING
+        chases = state == State.SEARCHING and search.grid.walk is not None
+        if not self.core.settings.sensor.hover_look_s or not (confirming or chases):
+            return False
         t = self.vehicle.telemetry
         attitude = (finite_or_level(t.pitch_deg), finite_or_level(t.roll_deg))
         pose = FramePose(
             t.lat, t.lon, self.core.helm.heights.up(t), t.heading_deg, t.position_time, *attitude
         )
-        if not self.core.settings.sensor.hover_look_s:
-            return False
         seen = self.intake.sensor.footprint(pose)
-        return list(self.search.place.cell) in seen.cells[seen.counts].tolist()
+        in_view = [(row, col) for row, col in seen.cells[seen.counts].tolist()]
+        return (confirming and search.place.cell in in_view) or search.pays_to_hover(in_view)

@@ -289,6 +289,5 @@ def _searched(why: str) -> Happen:
 
 
 def _hovers(seen: Situation, look: Look) -> bool:
-    """Whether to stay here for another look: at a suspect in view, when hovering gives one."""
-    wanted = look.settings.sensor.hover_look_s > 0.0 and look.standing.state == State.CONFIRMING
-    return wanted and seen.suspect_in_view
+    """Whether to stay here for another look at a suspect in view: when hovering gives one."""
+    return look.settings.sensor.hover_look_s > 0.0 and seen.suspect_in_view

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from roisearch.directions import DIRECTIONS, direction_between
 from roisearch.motion_fit import Flown
 from roisearch.planners.lookahead.planner import LookaheadPlanner
 from roisearch.planners.tour.planner import TourPlanner
+from service.area.model import TargetMotion
 from service.config import MOCK_SPEEDUP, PlannerName, Settings
-from service.evidence.observe import Observation
+from service.evidence.observe import Observation, Sighting
 from service.geometry import Cell
 from service.known import Judgement
 from service.mission.energy import Left
@@ -218,3 +220,31 @@ def test_what_one_aircraft_gives_up_the_others_do_not_fly_to_either() -> None:
     assert flown_in_vain(first, cell)
     assert second.planner is not before
     assert second.enough == first.enough < search().enough
+
+
+def reported(built: Search, cell: Cell) -> None:
+    """Something was reported at a cell."""
+    lat, lon = built.grid.frame.to_latlon([cell])[0].tolist()
+    one = np.ones(1, dtype=np.bool_)
+    seen = (Sighting(lat, lon, None),)
+    built.take(Observation(np.array([cell]), one, np.full(1, 0.9), np.full(1, 0.9), one, seen))
+
+
+@pytest.mark.parametrize("walks", [True, False])
+def test_it_pays_to_hover_at_once_where_something_was_seen_of_a_target_that_walks(walks: bool) -> None:
+    settings = Settings.model_validate(
+        {"sensor": {"cell_m": CELL_M, "hover_look_s": 8.0}, "search": {"iterations": 3, "looks_ahead": 500}}
+    )
+    built = Search(replace(GRID, target=TargetMotion(speed_mps=0.5)) if walks else GRID, settings)
+    here, there = GRID.start, built.place.cell
+    assert not built.pays_to_hover([here, there]), "nothing was decided yet, nor seen"
+    asyncio.run(built.decide(SearchState(here), ()))
+    reported(built, there)
+    assert built.pays_to_hover([here, there]) == walks
+    assert not built.pays_to_hover([here])
+    assert not built.pays_to_hover([])
+    if walks:  # after looks in vain it is not worth the time any more
+        vain, one = np.zeros(1, dtype=np.bool_), np.ones(1, dtype=np.bool_)
+        for _ in range(2):
+            built.take(Observation(np.array([there]), vain, np.full(1, 0.9), np.full(1, 0.9), one))
+        assert not built.pays_to_hover([there])

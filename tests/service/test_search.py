@@ -237,6 +237,7 @@ def test_it_pays_to_hover_at_once_where_something_was_seen_of_a_target_that_walk
     )
     built = Search(replace(GRID, target=TargetMotion(speed_mps=0.5)) if walks else GRID, settings)
     here, there = GRID.start, built.place.cell
+    built.warm_up()
     assert not built.pays_to_hover([here, there]), "nothing was decided yet, nor seen"
     asyncio.run(built.decide(SearchState(here), ()))
     reported(built, there)
@@ -245,6 +246,6 @@ def test_it_pays_to_hover_at_once_where_something_was_seen_of_a_target_that_walk
     assert not built.pays_to_hover([])
     if walks:  # after looks in vain it is not worth the time any more
         vain, one = np.zeros(1, dtype=np.bool_), np.ones(1, dtype=np.bool_)
-        for _ in range(2):
+        for _ in range(4):
             built.take(Observation(np.array([there]), vain, np.full(1, 0.9), np.full(1, 0.9), one))
         assert not built.pays_to_hover([there])

@@ -149,9 +149,9 @@ def test_hovering_over_what_was_found_ends_with_an_operators_word() -> None:
 def test_a_suspect_in_view_is_hovered_over_where_that_gives_another_look() -> None:
     talk = searching({"sensor": {"hover_look_s": 2.0}})
     talk.sees(place_probability=0.6, suspect_in_view=True)
-    talk.tick()
+    did = talk.tick()
     assert talk.state == State.CONFIRMING
-    assert Stop() in talk.tick()
+    assert Stop() in did
     assert Stop() not in talk.pass_by(3.0)
 
 

@@ -241,6 +241,8 @@ def test_it_pays_to_hover_at_once_where_something_was_seen_of_a_target_that_walk
     assert not built.pays_to_hover([here, there]), "nothing was decided yet, nor seen"
     asyncio.run(built.decide(SearchState(here), ()))
     reported(built, there)
+    assert not built.pays_to_hover([there]), "7 % of 200 s are not worth the 19 that it takes"
+    reported(built, there)
     assert built.pays_to_hover([here, there]) == walks
     assert not built.pays_to_hover([here])
     assert not built.pays_to_hover([])

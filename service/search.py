@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roisearch import Belief, Decision, Motion, Regions, SearchState, make_planner, segment_regions
 from roisearch.detection import DetectionRecord
@@ -32,7 +31,6 @@ from service.config import Settings, each_aircraft
 from service.drawing import Drawing
 from service.evidence.cover import covered_p_tp
 from service.evidence.found import Found
-from service.evidence.overlooked import MOST_IN_VAIN
 from service.evidence.plausible import ground_metres
 from service.evidence.sensors import field_of_view
 from service.evidence.suspects import Sightings
@@ -45,7 +43,6 @@ from service.known import Known, Said
 from service.mission.energy import Left
 from service.motion import MotionLimits, learnt_in_flight, limits_note, motion_of, within
 from service.outside import from_outside
-from service.places import written
 from service.reach import Reach
 from service.reasons import Reason
 from service.redrawing import Sketch, taking
@@ -121,7 +118,8 @@ class Search:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
         self._school = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._learning: Future[None] | None = None
-        self._expected_s: float | None = None  # seconds to the first detection, by the last decision
+        self.expected_s: float | None = None
+        """Seconds to the first detection, by the last decision; None: it did not count them."""
         self._rng = np.random.default_rng(settings.run.seed)
         self.common.new_ground.append(self._fly_on)
         self.common.new_drawing.append(self._redraw)
@@ -433,22 +431,8 @@ class Search:
         endurance = self.reach.endurance(left) if left is not None and known and near else None
         deadline = self.settings.search.deadline_s
         decision = self.ending.plan(thought, state, self._rng, deadline_s=deadline, endurance=endurance)
-        self._expected_s = -decision.value if isinstance(self.planner, InSeconds) else None
+        self.expected_s = -decision.value if isinstance(self.planner, InSeconds) else None
         return decision
-
-    def pays_to_hover(self, cells: Sequence[Cell]) -> bool:
-        """Whether to look at one of these cells again now, hovering, since something was reported there.
-
-        What was seen of a target that walks does not keep: it is somewhere else when the aircraft comes by again. So
-        another look pays where its chance is worth the time that it takes, in seconds until the target is detected. Of
-        one that stands still nothing is lost by going on, and it is looked at again when that is on the way.
-        """
-        if self.grid.walk is None or self._expected_s is None:
-            return False
-        took_s = self.settings.sensor.hover_look_s + self.motion.corner_seconds(180)
-        least = took_s / max(took_s, self._expected_s) / float(self.fov.p_tp[0]) * self.belief.total
-        hit = [cell for cell in cells if self.sightings.near(cell)]
-        return bool(hit) and float(self.belief.mass_at(np.array(hit)).max()) >= least
 
     def arrivals(
         self, path: Sequence[Cell], start: Cell, heading: str = "north", speed_mps: float = 0.0
@@ -503,39 +487,6 @@ class Search:
         self.ending.reckon_with(motion)
         if isinstance(self.planner, InSeconds):
             self.planner.reckon_with(motion)
-
-    def worth_a_look(self, path: Sequence[Cell]) -> frozenset[Cell]:
-        """The cells of `path` that are at least as likely as the mean of those that can be searched; none over flat
-        ground, where a look comes with every cell that is flown over."""
-        if self.heights is None or not path:
-            return frozenset()
-        worth = self._worth(np.array(path, dtype=np.int64))
-        return frozenset(cell for cell, is_worth in zip(path, worth.tolist(), strict=True) if is_worth)
-
-    def _worth(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether cells [k, 2] are at least as likely as the mean, and can be seen: bool [k]."""
-        mean = self.belief.total / max(1, int(np.count_nonzero(self.grid.searchable)))
-        hidden = self.common.overlooked.cells[cells[:, 0], cells[:, 1]]
-        return np.asarray((self.belief.mass_at(cells) >= mean) & ~hidden)
-
-    def passed(self, cell: Cell, heading: str, now: float) -> str:
-        """The aircraft has entered a cell for a look; what follows for the plan, as a sentence, or nothing."""
-        cells, _, _ = self.fov.looks(cell, heading, self.grid.frame.shape)
-        given_up = self.common.passed(cells[self._worth(cells)], now)
-        if not given_up:
-            return ""
-        ((lat, lon),) = self.grid.frame.to_latlon(np.array([cell]))
-        where = written((float(lat), float(lon)), self.grid.coordinates)
-        which = "a cell" if given_up == 1 else f"{given_up} cells"
-        return (
-            f"no look counted in {MOST_IN_VAIN} passes or more of {which} at {where}: taken as not to be seen from the "
-            "air, so that needs a ground team"
-        )
-
-    @property
-    def place_in_sight(self) -> bool:
-        """Whether the most likely place can be looked at, as far as is known."""
-        return not self.common.overlooked.cells[self.place.cell]
 
     def reason(self, decision: Decision, cell: Cell) -> Reason:
         """The decision in words: where to, how much is there, how far, and what else was weighed."""

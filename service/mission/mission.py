@@ -23,6 +23,7 @@ from service.evidence.reports import OrderReceipt
 from service.geometry import Cell, LatLon
 from service.journal import Journal
 from service.known import Withdrawn
+from service.looking import passed, worth_a_look
 from service.mavlink import LinkError, Vehicle
 from service.mission.apart import Other
 from service.mission.core import MissionCore
@@ -327,7 +328,7 @@ class Mission:
                     self._drop_thought()
                     self._thinking = self._group.create_task(self._think(effect))
                 case Passed(cell=cell, heading=heading):
-                    if note := self.search.passed(cell, heading, self.clock.now()):
+                    if note := passed(self.search, cell, heading, self.clock.now()):
                         log.warning("%s%s", self.called, note)
                         news.append(MapChanged(self.search.grid))
                 case Learn(flights=flights):
@@ -388,7 +389,7 @@ class Mission:
             return
         self._thinking = None
         self._stopwatch.decision(decision.effort.seconds)
-        reason, worth = self.search.reason(decision, wanted.cell), self.search.worth_a_look(decision.path)
+        reason, worth = self.search.reason(decision, wanted.cell), worth_a_look(self.search, decision.path)
         self._feed(Thought(decision, reason, worth))
 
     async def _act(self, action: Action) -> None:

@@ -8,6 +8,7 @@ from service.clock import Clock
 from service.evidence.intake import Intake
 from service.evidence.observe import FramePose, finite_or_level, heading_or_course
 from service.journal import Journal
+from service.looking import pays_to_hover, place_in_sight
 from service.mavlink import Vehicle
 from service.mission.core import MissionCore
 from service.mission.formation import Formation
@@ -54,7 +55,7 @@ class Outlook:
             searched=search.record.searched,
             enough=search.enough,
             place_probability=search.place.probability if looks else 0.0,
-            place_in_sight=search.place_in_sight if looks else True,
+            place_in_sight=place_in_sight(search) if looks else True,
             found=search.found() if looks else None,
             confirmed=search.confirmed is not None,
             suspect_in_view=self._suspect_in_view(),
@@ -76,4 +77,4 @@ class Outlook:
         )
         seen = self.intake.sensor.footprint(pose)
         in_view = [(row, col) for row, col in seen.cells[seen.counts].tolist()]
-        return (confirming and search.place.cell in in_view) or search.pays_to_hover(in_view)
+        return (confirming and search.place.cell in in_view) or pays_to_hover(search, in_view)

@@ -15,7 +15,8 @@ from scipy.special import bdtrc
 from service.evidence.observe import Observation
 from service.geometry import Cell
 
-_UNLIKELY = 1e-4  # so rarely may a detector that is as good as it is said to be, be taken for a worse one
+_UNLIKELY = 0.02  # so rarely may a find of a detector that is as good as it is said to be have to wait: the doubt goes
+# with the next looks in vain, while one that sees the target everywhere makes a place sure before many cells were seen
 _HALF = 0.5  # a hit counts when it is worth half of a full one: one spread over many cells is the hit of none
 
 

@@ -69,6 +69,19 @@ class NewsRequest(DoorModel):
     geometry: Shape
     properties: Annotated[Clue | Searched | Excluded, Field(discriminator="role")]
 
+    @model_validator(mode="before")
+    @classmethod
+    def _one_feature(cls, told: Any) -> Any:
+        """What maps export: a collection around one feature, and numbers for ids."""
+        if isinstance(told, dict) and told.get("type") == "FeatureCollection":
+            features = told.get("features")
+            if not isinstance(features, list) or len(features) != 1:
+                raise ValueError("news come one by one: send each feature of the collection by itself")
+            told = features[0]
+        if isinstance(told, dict) and type(told.get("id")) is int:
+            told = {**told, "id": str(told["id"])}
+        return told
+
     @model_validator(mode="after")
     def _its_shape_is_one(self) -> Self:
         kind, said = self.geometry.type, self.properties

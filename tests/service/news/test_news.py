@@ -197,3 +197,13 @@ def test_the_shipped_schema_is_the_one_that_is_checked_and_its_examples_are_good
     for example in EXAMPLES.values():
         jsonschema.validate(example, schema)
         NewsRequest.model_validate(example)
+
+
+def test_a_collection_around_one_feature_is_that_and_a_number_is_an_id() -> None:
+    feature = EXAMPLES["a clue at a point"]
+    one = NewsRequest.model_validate({"type": "FeatureCollection", "features": [{**feature, "id": 7}]})
+    assert one == NewsRequest.model_validate({**feature, "id": "7"})
+    with pytest.raises(ValidationError, match="send each feature of the collection by itself"):
+        NewsRequest.model_validate({"type": "FeatureCollection", "features": [feature, feature]})
+    with pytest.raises(ValidationError, match="send each feature of the collection by itself"):
+        NewsRequest.model_validate({"type": "FeatureCollection"})

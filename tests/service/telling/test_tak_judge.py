@@ -1,6 +1,6 @@
 """Our events before CloudTAK's library, which holds each against its schema of Cursor on Target and draws what it says.
 
-It is installed beside the test when it is missing, for which npm has to be there.
+It is installed in `.ci/tak` when it is missing, for which npm has to be there.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import pytest
 from service.telling.cot import AIRCRAFT, FOUND, GONE, SEARCHED, SUSPECT
 from tests.service.telling.test_tak import all_events, parsed
 
-CLIENT = Path(__file__).parent / "client"
+CLIENT = Path(__file__).parents[3] / ".ci" / "tak"
 INSTALL = ["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--silent"]
 
 

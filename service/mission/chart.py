@@ -105,7 +105,7 @@ class Chart:
     def refuse_over_home(self, excluded: shapely.Geometry | None, t: Telemetry) -> None:
         """Raises BadInput where ground that is to be excluded (in degrees, x = longitude) has home in it."""
         lat, lon = home = self.home(t)
-        if excluded is not None and shapely.contains_xy(excluded, lon, lat):
+        if excluded is not None and shapely.contains(excluded, shapely.Point(lon, lat)):
             raise BadInput(
                 f"the exclusion: the aircraft's home, {self.written(home)}, lies in it; move one of the two"
             )

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 MOST_IN_VAIN, CHANCE = 5, 0.001
 """So many passes without a look are enough, unless so many would come together by chance more often than this: looks
 are few where a detector sends a frame now and then."""
+PATIENCE = 4
+"""So many times as many it takes for a cell of which a look has counted once: it can be seen, if hardly."""
 APART_S = 5.0
 """Passes sooner after one another than this, in the time of the search, are one: an aircraft on the border of two
 cells is over both in turns."""
@@ -29,6 +31,7 @@ class Overlooked:
         """Bool [rows, cols]."""
         self.changes = 0
         """How often `cells` has become another one."""
+        self._seen = np.zeros(shape, dtype=np.bool_)  # a look at it has counted
         self._looks = 0
         self._shown = self._in_vain = 0  # passes that were followed by a look, and that were not
         self._passes: dict[tuple[int, int], tuple[int, float, int]] = {}
@@ -47,7 +50,7 @@ class Overlooked:
                 continue
             self._passes[row, col] = (in_vain + 1, now, self._looks)
             self._in_vain += in_vain >= 0
-            if in_vain + 1 >= self._most():
+            if in_vain + 1 >= self._most() * (PATIENCE if self._seen[row, col] else 1):
                 self.cells[row, col] = True
                 given_up += 1
         self.changes += given_up > 0
@@ -59,6 +62,7 @@ class Overlooked:
         for row, col in cells.tolist():
             self._shown += self._passes.pop((row, col), None) is not None
         rows, cols = cells[:, 0], cells[:, 1]
+        self._seen[rows, cols] = True
         taken_up = int(np.count_nonzero(self.cells[rows, cols]))
         self.cells[rows, cols] = False
         self.changes += taken_up > 0

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.evidence.overlooked import APART_S, MOST_IN_VAIN, Overlooked
+from service.evidence.overlooked import APART_S, MOST_IN_VAIN, PATIENCE, Overlooked
 
 CLIFF, OPEN = np.array([[2, 3]]), np.array([[0, 1]])
 
@@ -49,7 +49,10 @@ def test_one_look_that_counts_takes_it_up_again() -> None:
     assert not overlooked.cells.any()
     assert overlooked.changes == 2
     assert overlooked.looked(CLIFF) == 0
-    assert passes(overlooked, MOST_IN_VAIN) == 0, "the count begins anew"
+    assert passes(overlooked, MOST_IN_VAIN + 1) == 0, (
+        "the count begins anew, and what was seen once can be seen"
+    )
+    assert passes(overlooked, PATIENCE * MOST_IN_VAIN + 5) == 1
 
 
 def test_looks_in_between_keep_a_cell() -> None:

@@ -17,6 +17,7 @@ from service.geometry import Cell
 
 _UNLIKELY = 0.02  # so rarely may a find of a detector that is as good as it is said to be have to wait: the doubt goes
 # with the next looks in vain, while one that sees the target everywhere makes a place sure before many cells were seen
+_FEW = 3  # cells, of which a detector that is as good as it is said to be hardly reports the target in all
 _HALF = 0.5  # a hit counts when it is worth half of a full one: one spread over many cells is the hit of none
 
 
@@ -61,8 +62,16 @@ class Alarms:
         ]
         hits, rate = sum(beside), max(1.0 - self._p_tn, self._alarm / max(self._in_vain, 1))
         if not hits or bdtrc(hits - 1, len(beside), rate) >= _UNLIKELY:
-            return ""
+            return self._sees_it_everywhere()
         return (
             f"the detector reported the target in {hits} of {len(beside)} cells elsewhere, where p_tn = "
             f"{self._p_tn:g} lets expect {len(beside) * rate:.0f}; a person has to confirm what it finds"
+        )
+
+    def _sees_it_everywhere(self) -> str:
+        if len(self._cells) < _FEW or not all(one.hit for one in self._cells.values()):
+            return ""
+        return (
+            f"the detector reported the target in each of the {len(self._cells)} cells that it has seen; a person has "
+            "to confirm what it finds"
         )

@@ -3,7 +3,8 @@
 The target is in one place, so hits elsewhere are false alarms, and their share of the cells looked at is 1 - p_tn. A
 detector that sees it in every frame makes any place look certain within a few looks. How many of the cells outside the
 likely place's square had a hit in their first pass is a count of independent looks (later passes are not: the same
-stone fools it again), so it is held against the binomial distribution.
+stone fools it again), so it is held against the binomial distribution. While all that was seen lies around the place
+itself that says nothing: then it has to have looked somewhere in vain.
 """
 
 from __future__ import annotations
@@ -15,10 +16,13 @@ from scipy.special import bdtrc
 from service.evidence.observe import Observation
 from service.geometry import Cell
 
-_UNLIKELY = 0.02  # so rarely may a find of a detector that is as good as it is said to be have to wait: the doubt goes
-# with the next looks in vain, while one that sees the target everywhere makes a place sure before many cells were seen
-_FEW = 3  # cells, of which a detector that is as good as it is said to be hardly reports the target in all
-_HALF = 0.5  # a hit counts when it is worth half of a full one: one spread over many cells is the hit of none
+_UNLIKELY = 0.02
+"""So rarely may a find of a detector that is as good as it is said to be have to wait. The doubt goes with the next
+looks in vain, while one that sees the target everywhere makes a place sure before many cells were seen."""
+_FEW = 3
+"""Cells, of which a detector that is as good as it is said to be hardly reports the target in all."""
+_HALF = 0.5
+"""A hit counts when it is worth half of a full one: one spread over many cells is the hit of none."""
 
 
 @dataclass(slots=True)

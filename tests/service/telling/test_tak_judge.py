@@ -25,14 +25,14 @@ def judge() -> Path:
     """The script, with the library that it asks."""
     if shutil.which("node") is None or shutil.which("npm") is None:
         pytest.skip(
-            "node and npm are not installed: CloudTAK's library judges no events (apt-get install nodejs npm)"
+            "NO NODE, NO NPM: NO EVENT HAS BEEN JUDGED BY CLOUDTAK'S LIBRARY (apt-get install nodejs npm)"
         )
     library = CLIENT / "node_modules" / "@tak-ps" / "node-cot" / "dist" / "index.js"
     if not library.exists():
         done = subprocess.run(INSTALL, cwd=CLIENT, capture_output=True, text=True, timeout=300.0)
         if done.returncode or not library.exists():
             pytest.skip(
-                f"CloudTAK's library cannot be installed, so it judges no events: {done.stderr[-300:]}"
+                f"NO CLOUDTAK: NO EVENT HAS BEEN JUDGED BY ITS LIBRARY (npm ci: {done.stderr[-300:]})"
             )
     return CLIENT / "judge.mjs"
 

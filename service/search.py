@@ -107,9 +107,7 @@ class Search:
         """How high each cell is flown over, float [rows, cols]; None: the ground is taken as flat."""
         self.in_sight = seen_share(grid, settings)
         """In what share of directions a camera that looks ahead sees each cell, float [rows, cols]; None: in all."""
-        self._overlooked = self.common.overlooked.changes
-        self.enough = self._enough()
-        """The POS, given that the target is in the area, at which the search is at its end."""
+        self._see(grid)
         self.planner = self._make_planner()
         self.ending = self.ending_of(self.planner)
         """What plans the end of a battery."""
@@ -133,17 +131,17 @@ class Search:
         another._join()
         return another
 
-    @property
-    def visibility(self) -> Floats | None:
+    def _see(self, grid: Grid) -> None:
+        """What can be seen of a grid, as far as is known by now."""
+        self._overlooked = self.common.overlooked.changes
+        shares = [each for each in (grid.visibility, self.in_sight) if each is not None]
+        if self._overlooked:
+            shares.append(np.where(self.common.overlooked.cells, 0.0, 1.0))
+        self.visibility: Floats | None = np.prod(shares, axis=0) if shares else None
         """What a look may be expected to find in each cell as a share of what it finds in the open, float [rows, cols]:
         under cover, behind ridges, and where nothing is seen for whatever reason; None: all."""
-        shares = [each for each in (self.grid.visibility, self.in_sight) if each is not None]
-        if self.common.overlooked.changes:
-            shares.append(np.where(self.common.overlooked.cells, 0.0, 1.0))
-        return np.asarray(np.prod(shares, axis=0)) if shares else None
-
-    def _enough(self) -> float:
-        return self.settings.search.stop_at_pos * self.grid.mass_seen(self.visibility)
+        self.enough = self.settings.search.stop_at_pos * grid.mass_seen(self.visibility)
+        """The POS, given that the target is in the area, at which the search is at its end."""
 
     def _join(self) -> None:
         """From now on there are others: they are told what this one plans, and it is told what they do."""
@@ -327,8 +325,8 @@ class Search:
         """Other ground to fly over, or to see, needs another planner, whose kernels are compiled already."""
         flown_as_before = np.array_equal(grid.flyable, self.grid.flyable)
         seen_as_before = self._overlooked == self.common.overlooked.changes
-        self.grid, self._overlooked = grid, self.common.overlooked.changes
-        self.enough = self._enough()
+        self.grid = grid
+        self._see(grid)
         if flown_as_before and seen_as_before:
             return
         self.planner = self._make_planner()
@@ -410,11 +408,10 @@ class Search:
         thought = self.belief.copy()
         if now is not None and self.known.time is not None:
             thought.drift(min(max(0.0, now - self.known.time), MOST_S))
-        visibility = self.visibility if ahead else None
         for step in ahead:
             cells, p_tp, p_tn = self.fov.looks(step, state.heading, self.grid.frame.shape)
-            if visibility is not None:
-                p_tp = covered_p_tp(p_tp, p_tn, visibility[cells[:, 0], cells[:, 1]])
+            if self.visibility is not None:
+                p_tp = covered_p_tp(p_tp, p_tn, self.visibility[cells[:, 0], cells[:, 1]])
             thought.observe(cells, np.zeros(len(cells), dtype=np.bool_), p_tp, p_tn)
         think = functools.partial(self._decide, thought, state, left, now)
         decision = await asyncio.get_running_loop().run_in_executor(self._thread, think)

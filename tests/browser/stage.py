@@ -29,7 +29,7 @@ silent_after_s = 30  # of the vehicle's time; a busy host may pause for longer t
 [flight]
 stuck_after_s = 300
 [sensor]
-p_tn = 0.97
+p_tn = 0.995
 silent_after_s = 300
 [page]
 mbtiles_file = "{tiles}"
@@ -68,7 +68,7 @@ class Stage:
             "--area", str(AREA), "--runs", str(folder / "runs"), "--connect", link, "--takeoff",
             "--config", str(self.settings), "--cell", "25",
         )  # fmt: skip
-        where = ["--p-tn", "0.97", "--patience", "120"]
+        where = ["--p-tn", "0.995", "--patience", "120"]
         stack.enter_context(running("sim", "detector", "--service", self.url, *where))
         self.door = stack.enter_context(httpx.Client(base_url=self.url, timeout=30.0))
 

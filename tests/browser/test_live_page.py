@@ -9,6 +9,7 @@ import base64
 import json
 import re
 import time
+import uuid
 from pathlib import Path
 from typing import Any
 
@@ -161,6 +162,8 @@ def test_a_rejected_detection_lowers_the_map_there(watch: Watch, stage: Stage) -
     stage.door.post("/api/commands", json={"command": "hold"})  # nobody else is to change the map there
     watch.shows("HOLDING")
     assert at_rest(stage)
+    for each in stage.state()["suspects"]:  # a false alarm nearby would take this one into its own square
+        stage.door.post("/api/commands", json={"command": "reject", "lat": each["lat"], "lon": each["lon"]})
     grid = stage.door.get("/api/map").json()
     frame = GridFrame.from_dict(grid["frame"])
     left = np.array(grid["probability"], dtype=float)  # null is nan
@@ -174,7 +177,8 @@ def test_a_rejected_detection_lowers_the_map_there(watch: Watch, stage: Stage) -
     lat, lon = frame.to_latlon([(row, col)])[0].tolist()
     seen = {"lat": lat, "lon": lon, "score": 0.9, "image": base64.b64encode(JPEG).decode()}
     pose = {"lat": lat, "lon": lon, "height_m": 30.0, "heading_deg": 0.0}
-    report = {"id": "test-1", "source": "test", "captured_at": stage.state()["time"] - 1.0, "pose": pose}
+    report = {"id": f"test-{uuid.uuid4()}", "source": "test", "pose": pose}
+    report["captured_at"] = stage.state()["time"] - 1.0
     receipt = stage.door.post("/api/reports", json={**report, "detections": [seen]}).json()[0]
     assert receipt["hits"] == 1, receipt
     expect(page.locator("#suspects-card")).to_be_visible()

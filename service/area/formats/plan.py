@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
+
+import shapely
 
 from service.area.document import Document, Item, Json, label
 from service.area.geojson import Where, number
@@ -14,8 +17,8 @@ _CORNERS = 64
 
 
 def read_plan(root: Json, where: Where) -> Document:
-    """Survey polygons are searched, and the inclusion polygons of the geofence where there is no survey; what the
-    fence excludes is excluded; the planned home is the launch point.
+    """Surveys and corridor scans are searched, and the inclusion polygons of the geofence where there are none; what
+    the fence excludes is excluded; the planned home is the launch point.
 
     Raises:
         BadInput: it is no plan of QGroundControl.
@@ -59,8 +62,16 @@ def _take_items(document: Document, items: list[Any]) -> None:
             document.items.append(
                 Item(called, _polygon(item["polygon"]), {"role": "search"}, "survey", "survey")
             )
+        elif kind == "CorridorScan":
+            corridor = _corridor(item)
+            if corridor is None:
+                document.faults.append(f"{called}: it needs a line and a width in metres; draw it again.")
+            else:
+                document.items.append(Item(called, corridor, {"role": "search"}, "survey", "survey"))
         elif kind is not None:
-            document.notes.append(f"{called}: left out, only a survey says where to search")
+            document.notes.append(
+                f"{called}: left out, only a survey or a corridor scan says where to search"
+            )
         else:
             simple += 1
     if simple:
@@ -99,19 +110,40 @@ def _polygon(corners: Any) -> Json:
     return {"type": "Polygon", "coordinates": [[*ring, ring[0]] if ring else []]}
 
 
+def _corridor(scan: Json) -> Json | None:
+    """The strip of a corridor scan, as wide as it says; None when it is no strip."""
+    line, width = scan.get("polyline"), number(scan.get("CorridorWidth"))
+    corners = [_position(each) for each in line] if isinstance(line, list) else []
+    known = [each for each in corners if each is not None]
+    if len(known) < 2 or len(known) < len(corners) or width is None or not 0 < width < 1e5:
+        return None
+    plane = Projection(*known[0])
+    strip = shapely.buffer(shapely.LineString(plane.forward(known)), width / 2, cap_style="flat")
+    if strip.is_empty:  # all corners are one place
+        return None
+    outline = shapely.transform(strip, lambda metres: plane.inverse(metres)[:, ::-1])
+    drawn: Json = json.loads(shapely.to_geojson(outline))
+    return drawn
+
+
 def _circle(circle: Any) -> Json:
-    centre = circle.get("center") if isinstance(circle, dict) else None
+    centre = _position(circle.get("center")) if isinstance(circle, dict) else None
     radius = number(circle.get("radius")) if isinstance(circle, dict) else None
-    if not isinstance(centre, list) or len(centre) < 2 or radius is None or not 0 < radius < 1e6:
-        return {"type": "Polygon", "coordinates": None}
-    lat, lon = number(centre[0]), number(centre[1])
-    if lat is None or lon is None or not (abs(lat) <= 90 and abs(lon) <= 180):
+    if centre is None or radius is None or not 0 < radius < 1e6:
         return {"type": "Polygon", "coordinates": None}
     around = radius / math.cos(math.pi / _CORNERS)
     turns = [2.0 * math.pi * step / _CORNERS for step in range(_CORNERS)]
     metres = [[around * math.sin(turn), around * math.cos(turn)] for turn in turns]
-    ring = [[float(point[1]), float(point[0])] for point in Projection(lat, lon).inverse(metres)]
+    ring = [[float(point[1]), float(point[0])] for point in Projection(*centre).inverse(metres)]
     return {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
+
+
+def _position(given: Any) -> tuple[float, float] | None:
+    """(latitude, longitude), if it is one."""
+    if not isinstance(given, list) or len(given) < 2:
+        return None
+    lat, lon = number(given[0]), number(given[1])
+    return (lat, lon) if lat is not None and lon is not None and abs(lat) <= 90 and abs(lon) <= 180 else None
 
 
 def _swapped(position: Any) -> Any:

@@ -20,6 +20,7 @@ from service.area.document import few_notes, settings_in
 from service.area.formats import read_document
 from service.area.geojson import Where
 from service.area.mending import goes_around, mend
+from service.area.projection import surface_m2
 from service.errors import BadInput
 from tests.service.area.files import at, box, collection, feature, parse, point, polygon
 
@@ -322,6 +323,18 @@ def test_a_fence_alone_and_a_plan_of_the_first_version_are_plans() -> None:
     old = read(plan(mission=first, geoFence={"polygon": [[0, 0]], "version": 1}))
     assert old.launch == tuple(at(-200, -200)[::-1])
     assert noted(old, "the fence: left out")
+
+
+def test_a_corridor_scan_is_searched_as_wide_as_it_is() -> None:
+    scan: Json = {"type": "ComplexItem", "complexItemType": "CorridorScan", "version": 2, "CorridorWidth": 50}
+    scan["polyline"] = [at(*where)[::-1] for where in ((-200, 0), (0, 0), (0, 300))]
+    area = read(plan(mission={"items": [scan], "version": 2}))
+    assert surface_m2(area.polygon) == pytest.approx(50 * 500, rel=0.01)
+    assert area.polygon.covers(shapely.Point(at(20, 290)))
+    assert not area.polygon.covers(shapely.Point(at(30, 290)))
+    for wrong in ({"CorridorWidth": 0}, {"polyline": scan["polyline"][:1]}, {"polyline": [[91, 0], [92, 0]]}):
+        with pytest.raises(BadInput, match=r"CorridorScan.*it needs a line and a width in metres"):
+            read(plan(mission={"items": [{**scan, **wrong}], "version": 2}))
 
 
 def test_a_kmz_is_read_with_what_it_links_to_within_itself() -> None:

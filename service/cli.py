@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -152,9 +153,10 @@ def _search(words: list[str]) -> int:
                 raise BadInput(
                     f"--{name} does nothing with --resume: a run goes on with what is in its folder; leave it out"
                 )
-        if packed:
-            from service.packing import unpack
+        from service.packing import given_again, unpack
 
+        flags |= given_again(os.environ)
+        if packed:
             return resume(unpack(options.resume, Path(options.runs or "runs")), flags)
         return resume(options.resume, flags)
     settings = read_settings(options.config, flags=flags)

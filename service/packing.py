@@ -14,9 +14,11 @@ import shutil
 import sqlite3
 import tempfile
 import zipfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from service.config import variable_name
 from service.errors import BadInput
 from service.evidence.images import FOLDER as PICTURES
 from service.journal import Journal, read_meta, read_rows
@@ -24,12 +26,12 @@ from service.provenance import SECRET
 from service.survey import AREA, GIVEN, JOURNAL, PRIOR
 
 CARRIED = (
-    ("sensor", "calibration_file", "calibration"),
-    ("sensor", "terrain_file", "terrain"),
-    ("ground", "cover_file", "cover"),
-    ("ground", "mobility_file", "mobility"),
+    ("sensor", "calibration_file"),
+    ("sensor", "terrain_file"),
+    ("ground", "cover_file"),
+    ("ground", "mobility_file"),
 )
-"""Settings that name a file, by section and key, and what that file is called in the pack."""
+"""Settings that name a file which travels, by section and key; each aircraft's calibration does, too."""
 LEFT_OUT = (*SECRET, ("telling", "tak_ca_file"), ("page", "mbtiles_file"))
 """Settings that do not travel: secrets, and what names a file that does not."""
 MOST_BYTES = 20_000_000_000
@@ -46,20 +48,16 @@ def pack(folder: Path, out: Path) -> int:
     files = {AREA: folder / AREA}
     if (folder / PRIOR).exists():
         files[PRIOR] = folder / PRIOR
-    for section, key, name in CARRIED:
-        if given := settings.get(section, {}).get(key):
-            settings[section][key] = name + Path(given).suffix
-            files[settings[section][key]] = Path(given)
-    ground = settings.get("ground", {})
-    for i, given in enumerate(ground.get("file", [])):
-        name = Path(given).name  # some formats are told by their name
-        name = f"ground-{i}-{name}" if name in files else name
-        files[name] = Path(given)
-        ground["file"][i] = name
-    for section, key in left_out(settings):
-        settings[section][key] = ""
     files |= {given.name: given for given in folder.glob(f"{GIVEN}.*")}
     files |= {f"{PICTURES}/{file.name}": file for file in (folder / PICTURES).glob("*.jpg")}
+    for table, key in _carried(settings):
+        given = Path(table[key])
+        name = given.name  # some formats are told by their name
+        if name in files or name == JOURNAL:
+            name = f"{len(files)}-{name}"
+        table[key], files[name] = name, given
+    for section, key in left_out(settings):
+        settings[section][key] = ""
     try:
         with (
             tempfile.TemporaryDirectory() as aside,
@@ -86,6 +84,24 @@ def pack(folder: Path, out: Path) -> int:
 def left_out(settings: dict[str, Any]) -> list[tuple[str, str]]:
     """Which of the settings that are there do not travel, by section and key."""
     return [(section, key) for section, key in LEFT_OUT if settings.get(section, {}).get(key)]
+
+
+def given_again(environment: Mapping[str, str]) -> dict[str, str]:
+    """What does not travel and is told anew, by ROISEARCH_SECTION_KEY variables: 'section.key' to its value."""
+    names = {f"{section}.{key}": variable_name(f"{section}.{key}") for section, key in LEFT_OUT}
+    return {key: environment[name] for key, name in names.items() if name in environment}
+
+
+def _carried(settings: dict[str, Any]) -> Iterator[tuple[Any, Any]]:
+    """Where the settings name a file that travels: the table or list, and the key or index in it."""
+    for section, key in CARRIED:
+        if settings.get(section, {}).get(key):
+            yield settings[section], key
+    for aircraft in settings.get("aircraft", []):
+        if aircraft.get("sensor", {}).get("calibration_file"):
+            yield aircraft["sensor"], "calibration_file"
+    files = settings.get("ground", {}).get("file", [])
+    yield from ((files, i) for i in range(len(files)))
 
 
 def unpack(file: Path, parent: Path) -> Path:
@@ -135,10 +151,6 @@ def _settle(folder: Path) -> None:
     """Name the files where they lie now, and see that the journal is whole; its mark begins here."""
     with contextlib.closing(Journal(folder / JOURNAL)) as journal:
         settings = journal.meta("settings")
-        for section, key, name in CARRIED:
-            carried = settings.get(section, {}).get(key, "")
-            if carried.startswith(name):
-                settings[section][key] = str((folder / carried).resolve())
-        ground = settings.get("ground", {})
-        ground["file"] = [str((folder / Path(name).name).resolve()) for name in ground.get("file", [])]
-        journal.set_meta("settings", {**settings, "ground": ground})
+        for table, key in _carried(settings):
+            table[key] = str((folder / Path(table[key]).name).resolve())
+        journal.set_meta("settings", settings)

@@ -38,6 +38,8 @@ SECRET = (
 _SECRETS = frozenset(f"{section}.{key}" for section, key in SECRET)
 RASTERS = ("cover_file", "mobility_file")
 """Settings of the ground that may name a raster, or none."""
+VERSION = "version"
+"""The key of the version that a run was begun by, in its journal."""
 FINGERPRINTS = "files"
 """The key of them in a journal; runs of earlier versions have none."""
 
@@ -92,6 +94,7 @@ def changes(before: Settings, after: Settings) -> dict[str, Any]:
 def note_beginning(journal: Journal, folder: Path, settings: Settings) -> None:
     """Keep in a new journal what its run is begun with."""
     journal.set_meta(FINGERPRINTS, fingerprints(folder, settings))
+    journal.set_meta(VERSION, version("roisearch"))
     _number(journal, folder)
 
 
@@ -102,6 +105,13 @@ def note_resumption(journal: Journal, folder: Path, settings: Settings) -> None:
     """
     refuse_changed(folder, settings, journal.meta(FINGERPRINTS))
     _number(journal, folder)
+    begun_by = journal.meta(VERSION)  # early runs do not say
+    if begun_by != version("roisearch"):
+        log.info(
+            "this run was begun by roisearch %s and goes on with %s",
+            begun_by or "0.2 or 0.3",
+            version("roisearch"),
+        )
     changed = changes(stored_settings(journal.path, {}), settings)
     told = {key: "(not told)" if value and key in _SECRETS else value for key, value in changed.items()}
     tell_changes(told)

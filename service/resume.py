@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from service.area import Grid, SearchArea
-from service.config import Settings, changed_settings
+from service.config import Settings, changed_settings, without_unknown
 from service.drawing import RegionsRow
 from service.entries import Entry, read_entries, understanding
 from service.errors import BadInput
@@ -39,6 +41,7 @@ from service.search import Search
 from service.story import FlightSoFar
 from service.survey import AREA, JOURNAL, PRIOR, is_of, read_survey, survey
 
+log = logging.getLogger("roisearch")
 MOSTLY = 0.5
 NUMBER = "number"
 """The key of a run's number in its journal."""
@@ -47,8 +50,20 @@ _SAY_WHICH = frozenset({"link.connect", "link.system_id", "aircraft"})
 
 
 def stored_settings(journal: Path, changed: dict[str, Any]) -> Settings:
-    """The settings that a run was started with, but for those `changed` ('section.key': value; None: as stored)."""
-    return changed_settings(read_meta(journal, "settings"), changed, str(journal))
+    """The settings that a run was started with, but for those `changed` ('section.key': value; None: as stored).
+
+    What another version could set and this one cannot is left out, and said.
+    """
+    values, gone = without_unknown(read_meta(journal, "settings"))
+    _say_gone(journal, gone)
+    return changed_settings(values, changed, str(journal))
+
+
+@cache
+def _say_gone(journal: Path, gone: tuple[str, ...]) -> None:
+    """Once for a journal, however often its settings are read."""
+    for key in gone:
+        log.warning("%s: its setting %s is none of this version, and left out", journal, key)
 
 
 def stored_run(folder: Path) -> tuple[Settings, SearchArea, Grid, list[Entry]]:

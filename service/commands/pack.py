@@ -27,6 +27,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str]) -> int:
     """Write the file; returns the exit code. Raises BadInput."""
     options = parser().parse_args(list(arguments))
+    from service.config import variable_name
     from service.journal import read_meta
     from service.packing import left_out, pack
     from service.survey import JOURNAL
@@ -35,5 +36,8 @@ def main(arguments: Sequence[str]) -> int:
     rows = pack(options.run, out)
     print(f"{out}: {rows} rows, the area and the settings without secrets")
     if stays := left_out(read_meta(options.run / JOURNAL, "settings")):
-        print(f"to be given again there: {', '.join(f'{section}.{key}' for section, key in stays)}")
+        keys = [f"{section}.{key}" for section, key in stays]
+        print(
+            f"to be given again there: {', '.join(keys)}, by variables such as {variable_name(keys[0])}=..."
+        )
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
 from collections.abc import Mapping
 from typing import Any
@@ -43,6 +44,22 @@ def problems(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     except ValidationError as error:
         return [_problem(details) for details in error.errors()]
     return []
+
+
+def without_unknown(values: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Settings of another version without those that there are none of now, and these, as dotted keys."""
+    known, gone = copy.deepcopy(dict(values)), []
+    try:
+        Settings.model_validate(values)
+    except ValidationError as error:
+        for details in error.errors():
+            if details["type"] == "extra_forbidden":
+                table: Any = known
+                for part in details["loc"][:-1]:
+                    table = table[part]
+                del table[details["loc"][-1]]
+                gone.append(".".join(str(part) for part in details["loc"]))
+    return known, tuple(gone)
 
 
 def _problem(details: Any) -> tuple[str, str]:

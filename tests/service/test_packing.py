@@ -15,7 +15,7 @@ from service.evidence.images import Images
 from service.export.run import read_run
 from service.journal import Journal, read_meta, read_rows
 from service.mark import read_mark
-from service.packing import pack, unpack
+from service.packing import given_again, pack, unpack
 from service.provenance import FINGERPRINTS, fingerprints, refuse_changed
 from service.resume import stored_settings
 from service.survey import JOURNAL
@@ -51,7 +51,7 @@ def test_a_run_arrives_with_its_rows_its_ground_and_its_files_but_no_secrets(tmp
     assert list(read_rows(there / JOURNAL)) == rows
     assert read_mark(there / JOURNAL) == len(rows)
     settings = stored_settings(there / JOURNAL, {})
-    assert Path(settings.sensor.calibration_file) == (there / "calibration.csv").resolve()
+    assert Path(settings.sensor.calibration_file) == (there / "elsewhere.csv").resolve()
     assert (settings.link.signing_key_file, settings.http.token_file) == ("", "")
     assert (settings.telling.webhook, settings.telling.tak_certificate_file) == ("", "")
     refuse_changed(there, settings, read_meta(there / JOURNAL, FINGERPRINTS))
@@ -103,7 +103,9 @@ def test_the_command_names_the_file_after_the_run(
     said = capsys.readouterr().out
     assert "slope.zip: " in said
     stay = "link.signing_key_file, http.token_file, telling.webhook, telling.tak_certificate_file"
-    assert f"to be given again there: {stay}\n" in said
+    assert (
+        f"to be given again there: {stay}, by variables such as ROISEARCH_LINK_SIGNING_KEY_FILE=...\n" in said
+    )
     assert main(["--resume", "slope.zip", "--prior", "x.tif"]) == 2
     assert "--prior does nothing with --resume" in capsys.readouterr().err
 
@@ -121,8 +123,35 @@ def test_rasters_of_the_ground_come_along(tmp_path: Path, raster: str) -> None:
     pack(folder, tmp_path / "slope.zip")
     there = unpack(tmp_path / "slope.zip", tmp_path / "runs")
     carried = Path(getattr(stored_settings(there / JOURNAL, {}).ground, f"{raster}_file"))
-    assert carried == (there / f"{raster}.tif").resolve()
+    assert carried == (there / "forest.tif").resolve()
     assert carried.read_bytes() == b"as it is"
+
+
+def test_files_of_one_name_and_the_calibration_of_each_aircraft_come_along(tmp_path: Path) -> None:
+    folder = run_with_files(tmp_path / "here")
+    given = [tmp_path / name / "elsewhere.csv" for name in ("kite", "lark")]
+    for each in given:
+        each.parent.mkdir()
+        each.write_text(each.parent.name)
+    journal = Journal(folder / JOURNAL)
+    aircraft = [{"name": each.parent.name, "sensor": {"calibration_file": str(each)}} for each in given]
+    journal.set_meta("settings", {**journal.meta("settings"), "aircraft": aircraft})
+    journal.set_meta(FINGERPRINTS, fingerprints(folder, stored_settings(folder / JOURNAL, {})))
+    journal.close()
+    pack(folder, tmp_path / "slope.zip")
+    for each in given:
+        each.unlink()
+    there = unpack(tmp_path / "slope.zip", tmp_path / "runs")
+    settings = stored_settings(there / JOURNAL, {})
+    refuse_changed(there, settings, read_meta(there / JOURNAL, FINGERPRINTS))
+    carried = [Path(each.sensor.given["calibration_file"]) for each in settings.aircraft]
+    assert [each.read_text() for each in carried] == ["kite", "lark"]
+    assert {each.parent for each in carried} == {there.resolve()}
+
+
+def test_what_does_not_travel_is_given_again_by_variables(tmp_path: Path) -> None:
+    variables = {"ROISEARCH_LINK_SIGNING_KEY_FILE": "/there/key", "ROISEARCH_SENSOR_P_TP": "0.5"}
+    assert given_again(variables) == {"link.signing_key_file": "/there/key"}  # and nothing that did
 
 
 def test_pictures_and_the_area_as_it_was_given_come_along(tmp_path: Path) -> None:

@@ -16,12 +16,14 @@ from service.journal import Journal, read_meta
 from service.provenance import (
     FINGERPRINTS,
     SECRET,
+    VERSION,
     changes,
     fingerprints,
     note_resumption,
     refuse_changed,
     tell_changes,
 )
+from service.resume import stored_settings
 from service.rows import ResumedRow
 from service.survey import AREA, JOURNAL, PRIOR
 
@@ -99,6 +101,22 @@ def test_a_resumption_is_journalled_with_what_it_changes(tmp_path: Path) -> None
     (entry,) = read_entries(tmp_path / JOURNAL)
     assert isinstance(entry.said, ResumedRow)
     assert entry.said.changed == {"flight.takeoff": True}
+
+
+def test_a_run_of_another_version_says_so_and_leaves_out_what_is_no_setting_now(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    settings, _ = begun(tmp_path)
+    caplog.set_level(logging.INFO)
+    with contextlib.closing(Journal(tmp_path / JOURNAL)) as journal:
+        stored = settings.model_dump()
+        stored["demo"]["speedup"] = 20.0
+        journal.set_meta("settings", stored)
+        journal.set_meta(VERSION, "0.2.0")
+        note_resumption(journal, tmp_path, settings)
+    assert "begun by roisearch 0.2.0 and goes on with" in caplog.text
+    assert caplog.text.count("its setting demo.speedup is none of this version, and left out") == 1
+    assert stored_settings(tmp_path / JOURNAL, {}) == settings
 
 
 def covered(folder: Path, content: bytes, key: str) -> Settings:

@@ -428,7 +428,8 @@ class SoakFlight:
         place = self.plan.target
         target = None if place is None else Target(place, frozenset(true_hits))
         for run in self._alive_runs() if hasattr(self, "_runs") else []:
-            outcome.violations += audit(run, acknowledged, told, target)
+            refuses = "command_refused" in outcome.faults
+            outcome.violations += audit(run, acknowledged, told, target, refuses=refuses)
         for word in _BAD_WORDS:
             if word in outcome.said:
                 line = next(line for line in outcome.said.splitlines() if word in line)

@@ -136,7 +136,7 @@ KINDS: dict[str, Kind] = {
     "gps_jump": Kind(2, (3, 30), _jump),
     "ekf_bad": Kind(1, (1, 6)),
     "wind": Kind(2, (15, 60), _wind),
-    "battery_drains": Kind(0.5, (30, 60), lambda rng: {"percent_per_s": float(rng.uniform(0.5, 2.0))}),
+    "battery_drains": Kind(0.5, (30, 60), lambda rng: {"percent_per_s": float(rng.uniform(0.2, 0.6))}),
     "battery_critical": Kind(
         0.5, (10, 20), lambda rng: {"action": str(rng.choice(["return", "land", "warn"]))}, last=True
     ),

@@ -30,6 +30,7 @@ interface AircraftState {
   ahead: [number, number][];
   steps: number;
   flight_time_s: number;
+  sorties: SortieState[];
   pose: PoseState | null;
   footprint: FootprintState;
 }
@@ -216,6 +217,7 @@ interface RunState {
 
 interface SortieState {
   number: number;
+  aircraft: string;
   landed: number;
   flight_time_s: number;
   steps: number;

@@ -17,10 +17,18 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from service.area.document import one_line
 from service.area.frame import GridFrame
+from service.area.model import Exclusion
 from service.area.prior import cell_squares, covered_fraction
 
 NewsRole = Literal["clue", "searched", "exclude"]
+ROLE_WORDS: dict[NewsRole, str] = {
+    "clue": "a clue",
+    "searched": "searched by others",
+    "exclude": "not flown over any more",
+}
+"""What each role is called to people."""
 _NOTHING = 1e-6  # a factor so near to 1, or a POD so near to 0, is none
 
 
@@ -49,6 +57,14 @@ class FieldNews:
             and np.array_equal(self.values, other.values)
             and self.ground == other.ground
         )
+
+
+def as_exclusion(news: FieldNews) -> Exclusion:
+    """An exclusion that was told as one of the area file, which keeps its mass."""
+    assert news.ground is not None
+    return Exclusion(
+        news.ground, searchable=True, label=f'news ("{one_line(news.words)}")' if news.words else "news"
+    )
 
 
 def clue_factors(

@@ -209,11 +209,12 @@ class BaseView:
         return partial(draw_map, self.ground_now(), self.seen().copied())
 
 
-def sortie_states(sorties: Sequence[SortieRow]) -> list[SortieState]:
-    """The flights that are over, as they are told."""
+def sortie_states(sorties: Sequence[SortieRow], aircraft: str) -> list[SortieState]:
+    """The flights of an aircraft that are over, as they are told."""
     return [
         {
             "number": each.number,
+            "aircraft": aircraft,
             "landed": each.landed,
             "flight_time_s": each.seconds,
             "steps": each.steps,

@@ -14,7 +14,7 @@ from prometheus_client import CollectorRegistry, Gauge, Histogram
 
 from service.area import SearchArea
 from service.clock import Clock
-from service.config import Settings
+from service.config import ONLY, Settings
 from service.errors import BadInput, shown
 from service.evidence.counts import Counts
 from service.evidence.observe import FramePose, finite_or_level
@@ -226,7 +226,7 @@ class RunView(BaseView):
             "outside": self.search.belief.outside,
             "steps": mission.flight.steps if mission else 0,
             "flight_time_s": flown,
-            "sorties": sortie_states(mission.flight.sorties) if mission else [],
+            "sorties": sortie_states(mission.flight.sorties, mission.name or ONLY) if mission else [],
             "news": news_states(self.search.known.news),
             "flight_left_s": self._flight_left(flown),
             "battery_percent": telemetry.battery_percent if telemetry else None,
@@ -279,6 +279,7 @@ class RunView(BaseView):
             "ahead": mission.ahead(),
             "steps": mission.flight.steps,
             "flight_time_s": mission.flight_time(),
+            "sorties": sortie_states(mission.flight.sorties, name),
             "pose": pose_state(pose, self.settings.run.coordinates),
             "footprint": self.footprint(pose, mission.name),
         }

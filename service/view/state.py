@@ -158,10 +158,11 @@ class EstimateState(TypedDict):
 
 class SortieState(TypedDict):
     """A flight that is over: its number from 1, when it landed (seconds since the epoch), its seconds in the air and
-    cells of the search, POS after it, why it ended, and the MAVLink system id and the autopilot of the aircraft that
-    flew it, which null does not know."""
+    cells of the search, POS after it, why it ended, the name of the aircraft that flew it (each counts its own), and
+    its MAVLink system id and autopilot, which null does not know."""
 
     number: int
+    aircraft: str
     landed: float
     flight_time_s: float
     steps: int
@@ -221,6 +222,7 @@ class AircraftState(TypedDict):
     ahead: list[LatLon]
     steps: int
     flight_time_s: float
+    sorties: list[SortieState]
     pose: PoseState | None
     footprint: FootprintState
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from service.rows import ReportRow
+from service.rows import ReportRow, SortieRow
 from service.view.replay import ReplayView
 from tests.service.export.recorded import SETTINGS, Recorder, record
 
@@ -47,6 +47,9 @@ def test_a_replay_knows_each_of_several_aircraft(tmp_path: Path) -> None:
             recorder.look(cell, hit=cell == cells[4])
     recorder.aircraft = {"aircraft": "kite"}
     recorder.write("transition", **{"from": "SEARCHING", "event": "hold", "to": "HOLDING", "reason": "test"})
+    for name in ("kite", "crow"):
+        recorder.aircraft = {"aircraft": name}
+        recorder.write("sortie", **SortieRow(1, recorder.time, 60.0, 3, 0.1, f"battery of {name}").body())
     recorder.journal.close()
     view = ReplayView(tmp_path)
     kite, crow = view.state()["aircraft"]
@@ -54,6 +57,10 @@ def test_a_replay_knows_each_of_several_aircraft(tmp_path: Path) -> None:
         ("kite", 0, "HOLDING"),
         ("crow", 1, "SEARCHING"),
     ]
+    own = [
+        [(each["aircraft"], each["number"], each["why"]) for each in one["sorties"]] for one in (kite, crow)
+    ]
+    assert own == [[("kite", 1, "battery of kite")], [("crow", 1, "battery of crow")]]
     where = recorder.grid.frame.to_latlon([cells[2], cells[4]]).tolist()
     assert [[kite["lat"], kite["lon"]], [crow["lat"], crow["lon"]]] == where
     assert (len(view.track()), len(view.hits()), view.state()["reports"]["accepted"]) == (3, 1, 5)

@@ -37,8 +37,9 @@ class FieldNews:
     """One piece of news as it is believed.
 
     `cells` int [k, 2]; `values` float [k]: for a clue the factors by which the prior there is multiplied, for ground
-    that was searched the POD of it, for an exclusion the part that it covers. `ground` are its polygons in degrees, x =
-    longitude, if it is drawn as such. `words` are whose who sent it; `place` is its middle, latitude and longitude.
+    that was searched the POD of it; none for an exclusion (early journals keep some). `ground` are its polygons in
+    degrees, x = longitude, if it is drawn as such. `words` are whose who sent it; `place` is its middle, latitude and
+    longitude.
     """
 
     id: str
@@ -51,11 +52,10 @@ class FieldNews:
 
     def says_as(self, other: FieldNews) -> bool:
         """Whether the other one says the same, under whatever name."""
-        return (
-            (self.role, self.words) == (other.role, other.words)
-            and np.array_equal(self.cells, other.cells)
-            and np.array_equal(self.values, other.values)
-            and self.ground == other.ground
+        if (self.role, self.words, self.ground) != (other.role, other.words, other.ground):
+            return False
+        return self.role == "exclude" or (
+            np.array_equal(self.cells, other.cells) and np.array_equal(self.values, other.values)
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,11 @@ from pydantic import ValidationError
 
 from service.area import Grid, build_grid, parse_area
 from service.entries import as_json, understood
+from service.errors import BadInput
 from service.evidence.observe import Observation
 from service.journal import Row
 from service.known import Judgement, Known, Said, Withdrawn
-from service.news.request import EXAMPLES, MOST_CELLS, NewsRequest, news_schema
+from service.news.request import EXAMPLES, FARTHEST_M, MOST_CELLS, NewsRequest, apart_m, news_schema
 from service.rows import NewsRow, WithdrawnRow
 from tests.integration.flight import FIELD
 
@@ -173,7 +175,16 @@ def test_the_journal_keeps_every_bit() -> None:
         ({"properties": {"role": "clue", "bayes_factor": 0, "sigma_m": 5}}, "greater than or equal to 0.001"),
         ({"properties": {"role": "searched", "pod": 0.5}}, "is a Polygon or a MultiPolygon, not a Point"),
         ({"properties": {"role": "rumour"}}, "does not match any of the expected tags"),
-        ({"bbox": []}, "Extra inputs are not permitted"),
+        ({"id": ".."}, "cannot stand in an address"),
+        ({"geometry": {"type": "MultiPoint", "coordinates": []}}, "has no position"),
+        (
+            {"properties": {"role": "clue", "bayes_factor": 3, "sigma_m": 5, "Word": "hat"}},
+            "there is no property 'Word'; did you mean 'words'",
+        ),
+        (
+            {"properties": {"role": "clue", "bayes_factor": 3, "sigma_m": 5, "pod": 0.5}},
+            "of the role 'clue' has no 'pod'",
+        ),
     ],
 )
 def test_news_that_cannot_be_is_refused_in_words(change: dict[str, Any], words: str) -> None:
@@ -187,6 +198,70 @@ def test_news_about_no_ground_that_is_searched_or_about_too_much_is_refused() ->
     with pytest.raises(Exception, match="no ground that is searched"):
         far.news(GRID, "a")
     assert MOST_CELLS >= 100_000
+
+
+def square(lon: float, lat: float, degrees: float = 0.002) -> dict[str, Any]:
+    """A ground of that size north-east of a place."""
+    east, north = lon + degrees, lat + degrees
+    ring = [[lon, lat], [east, lat], [east, north], [lon, north], [lon, lat]]
+    return {"type": "Polygon", "coordinates": [ring]}
+
+
+def told(role: str, geometry: dict[str, Any], **said: Any) -> NewsRequest:
+    feature = {"type": "Feature", "geometry": geometry, "properties": {"role": role, **said}}
+    return NewsRequest.model_validate(feature)
+
+
+@pytest.mark.parametrize(
+    ("lon", "lat"),
+    [
+        (47.05, 8.30),  # the two swapped
+        (8.30, 47.07),  # 2 km off
+        (8.30 - 180.0, -47.05),  # the other side of the earth, which is projected into the area
+    ],
+)
+def test_an_exclusion_or_ground_far_from_the_area_is_refused(lon: float, lat: float) -> None:
+    ground = square(lon, lat)
+    with pytest.raises(BadInput, match=r"km from the area .*are longitude and latitude swapped\?"):
+        told("exclude", ground).news(GRID, "a")
+    for role, said in (("searched", {"pod": 0.5}), ("clue", {"bayes_factor": 5.0})):
+        with pytest.raises(BadInput, match="no ground that is searched"):
+            told(role, ground, **said).news(GRID, "a")
+
+
+def test_an_exclusion_beside_the_area_is_taken_it_may_lie_on_the_way_home() -> None:
+    beside = told("exclude", square(8.305, 47.053)).news(GRID, "a")
+    assert 0.0 < apart_m(GRID, beside.ground) < FARTHEST_M
+    assert not len(beside.cells)
+
+
+def test_an_exclusion_may_be_of_any_size_and_one_of_an_early_journal_says_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("service.news.request.MOST_CELLS", 10)
+    half = told("exclude", request(kind="Polygon").geometry.model_dump()).news(GRID, "a")
+    early = replace(half, cells=CELLS[:50], values=np.ones(50))
+    assert half.says_as(early)
+    assert not half.says_as(told("exclude", square(8.301, 47.05)).news(GRID, "a"))
+    with pytest.raises(BadInput, match="at most 10 are taken"):
+        request("searched", "Polygon").news(GRID, "a")
+
+
+def test_what_maps_write_beside_is_left_out() -> None:
+    plain = NewsRequest.model_validate(EXAMPLES["ground that a team has searched"])
+    drawn = json.loads(json.dumps(EXAMPLES["ground that a team has searched"]))
+    drawn["bbox"] = drawn["geometry"]["bbox"] = [-4.742, 56.608, -4.739, 56.6095]
+    drawn["title"] = "Team 3"
+    drawn["properties"] |= {"name": "Team 3", "stroke": "#f00", "stroke-width": 2, "class": "Shape"}
+    assert NewsRequest.model_validate(drawn) == plain
+
+
+def test_a_clue_may_be_at_several_points() -> None:
+    points = {"type": "MultiPoint", "coordinates": [[8.3006, 47.0507], [8.3016, 47.0507]]}
+    news = told("clue", points, bayes_factor=10.0, sigma_m=15.0).news(GRID, "a")
+    for lon, lat in points["coordinates"]:
+        cell = GRID.frame.to_cells([(lat, lon)])[0]
+        assert news.values[(news.cells == cell).all(axis=1)] > 7.0
 
 
 def test_the_shipped_schema_is_the_one_that_is_checked_and_its_examples_are_good() -> None:

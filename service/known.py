@@ -70,6 +70,9 @@ class Known:
             tuple[Known, int]
         ] = []  # earlier states, the oldest first, and how much was said by then
         self._begin()
+        self.told_mass = self.belief.probability()
+        """Where the target was believed to be when news came last, float [rows, cols]: what is flown after an exclusion
+        depends on it, and has to be the same whenever it is asked for."""
 
     def _begin(self) -> None:
         """As it was before anything was seen, with the clues that stand."""
@@ -121,6 +124,7 @@ class Known:
             self._kept = []
             self._begin()
             self._believe_all(self._said)
+            self.told_mass = self.belief.probability()
         elif self._is_late(moment):
             self._believe_all(self._go_back(moment))
         else:

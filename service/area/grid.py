@@ -83,6 +83,8 @@ class Grid:
     target: TargetMotion | None = None
     mobility: FloatArray | None = None
     coordinates: Coordinates = "degrees"
+    cut_off: str = ""
+    """Where the ground is that exclusions told in flight have cut off, for people; empty: there is none."""
 
     @property
     def walk(self) -> "Walk | None":
@@ -108,8 +110,11 @@ class Grid:
 
     def mass_seen(self, visibility: FloatArray | None) -> float:
         """The same where a look finds such a part, [rows, cols], of what it finds in the open; None: all."""
-        seen = self.flyable if visibility is None else self.flyable & (visibility >= NEEDS_A_TEAM)
-        return float(self.prior[seen].sum())
+        return float(self.prior[self.seen(visibility)].sum())
+
+    def seen(self, visibility: FloatArray | None) -> BoolArray:
+        """The flyable cells, bool [rows, cols], where a look finds what is worth a search from above."""
+        return self.flyable if visibility is None else self.flyable & (visibility >= NEEDS_A_TEAM)
 
     @functools.cached_property
     def _flyable_cells(self) -> NDArray[np.int64]:
@@ -175,8 +180,11 @@ class Grid:
         """The same grid with one more sentence for the operator."""
         return replace(self, layout_notes=(*self.layout_notes, note))
 
-    def excluding(self, shape: shapely.Geometry) -> "Grid":
+    def excluding(self, shape: shapely.Geometry, mass: FloatArray | None = None) -> "Grid":
         """The same grid with one more exclusion (degrees, x = longitude), which keeps its mass but is not flown over.
+
+        Of several parts that it leaves the one with the most of `mass` stays, float [rows, cols]: where the target may
+        be by now; None: as the prior has it.
 
         Raises:
             BadInput: it leaves nothing to fly over, closes the way from the launch point, or has too many corners.
@@ -187,16 +195,28 @@ class Grid:
         allowed = self.flyable & ~shapely.intersects(blocked.zone.prepared, cell_squares(self.frame))
         if not allowed.any():
             raise where.bad("it leaves no cell to fly over; make it smaller")
+        mass = self.prior if mass is None else mass
         flyable, _, notes = _reachable_part(
-            self.frame, allowed, self.prior, blocked, self.launch, where, self.coordinates
+            self.frame, allowed, mass, blocked, self.launch, where, self.coordinates
         )
         start = nearest_flyable(self.frame, flyable, self.launch)
+        lost, place = allowed & ~flyable, ""
+        if lost.any():
+            row, col = np.unravel_index(np.argmax(np.where(lost, mass, -1.0)), lost.shape)
+            lat, lon = self.frame.to_latlon([(row, col)])[0]
+            place = written((float(lat), float(lon)), self.coordinates)
+            whole = float(mass.sum())
+            notes = (
+                f"exclusions cut off ground around {place}, where {share(float(mass[lost].sum()) / whole)} of the "
+                f"probability lies: it is not flown, what has {share(float(mass[flyable].sum()) / whole)} is",
+            )
         return replace(
             self,
             flyable=_frozen(flyable),
             keep_out=blocked,
             start=start,
             layout_notes=self.layout_notes + notes,
+            cut_off=place,
         )
 
     def with_prior(self, prior: ArrayLike) -> "Grid":

@@ -63,11 +63,11 @@ async function post(path, body) {
   return (await ask(path, options)).json();
 }
 
-/** @param {() => Promise<{ id: string, status: string }>} doing */
+/** @param {() => Promise<{ id: string, status: string, notes: string[] }>} doing */
 async function say_of(doing) {
   try {
-    const { id, status } = await doing();
-    tell(`${id}: ${status}`);
+    const { id, status, notes } = await doing();
+    tell([`${id}: ${status}`, ...notes].join("; "));
   } catch (error) {
     tell(/** @type {Error} */ (error).message);
   }

@@ -26,6 +26,7 @@ from service.mavlink.modes import mode_title
 from service.mission.mission import Mission
 from service.mission.situation import on_ground
 from service.mission.states import State
+from service.news.bearing import FieldNews
 from service.news.request import NewsRequest, refuse_other
 from service.search import Search
 from service.squad import Squad
@@ -169,9 +170,9 @@ class RunView(BaseView):
             news = await asyncio.to_thread(request.news, self.search.grid, name)
             if (before := known.heard_as(name)) is not None:
                 refuse_other(news, before, stands=before in known.news)
-                return {"id": name, "status": "duplicate", "cells": 0}
-            await self._begun().hear(news)
-            return {"id": name, "status": "accepted", "cells": len(news.cells)}
+                return {"id": name, "status": "duplicate", "cells": 0, "notes": []}
+            notes = await self._heard(news)
+            return {"id": name, "status": "accepted", "cells": len(news.cells), "notes": notes}
 
     async def withdraw(self, name: str) -> HeardState:
         """News are taken back. Raises BadInput, JournalLost."""
@@ -181,8 +182,14 @@ class RunView(BaseView):
                 raise BadInput(
                     f"there is no news {shown(name)} that could be taken back; /api/state tells which stand"
                 )
-            await self._begun().hear(Withdrawn(name))
-            return {"id": name, "status": "withdrawn", "cells": standing[name]}
+            notes = await self._heard(Withdrawn(name))
+            return {"id": name, "status": "withdrawn", "cells": standing[name], "notes": notes}
+
+    async def _heard(self, said: FieldNews | Withdrawn) -> list[str]:
+        """Let all of them hear news; what there is to note of the ground that was not so before."""
+        known = self.search.grid.layout_notes
+        await self._begun().hear(said)
+        return [note for note in self.search.grid.layout_notes if note not in known]
 
     def _begun(self) -> Squad:
         if self.squad is None:

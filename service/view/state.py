@@ -173,8 +173,8 @@ class SortieState(TypedDict):
 
 
 class NewsState(TypedDict):
-    """A piece of news that stands: its id, role ("clue" or "searched"), words, the middle of its place, and how many
-    cells it is about."""
+    """A piece of news that stands: its id, role ("clue", "searched" or "exclude"), words, the middle of its place, and
+    how many cells it is about (an exclusion says nothing of any)."""
 
     id: str
     role: str
@@ -185,12 +185,13 @@ class NewsState(TypedDict):
 
 
 class HeardState(TypedDict):
-    """What became of a piece of news: "accepted", "duplicate" of an id that was known, or "withdrawn"; and about how
-    many cells it is."""
+    """What became of a piece of news: "accepted", "duplicate" of an id that was known, or "withdrawn"; about how
+    many cells it is; and what a person has to know of what follows."""
 
     id: str
     status: str
     cells: int
+    notes: list[str]
 
 
 class DrawnState(TypedDict):

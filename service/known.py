@@ -21,6 +21,7 @@ from roisearch.detection import DetectionRecord
 from roisearch.walk import MOST_S
 from roisearch.watch import LOOKED
 from service.area import Grid
+from service.area.projection import FloatArray
 from service.evidence.alarms import Alarms
 from service.evidence.cover import detection_p
 from service.evidence.observe import Observation
@@ -61,6 +62,8 @@ class Known:
 
     def __init__(self, grid: Grid, p_tp: float, p_tn: float) -> None:
         self._grid, self._rates = grid, (p_tp, p_tn)
+        self._priors: dict[frozenset[str], FloatArray] = {}
+        """The priors without what is refuted, by that: they take long on a large map."""
         self.since: float | None = None
         """Of the first word, as `time`: the prior is taken to be of then."""
         self._said: list[tuple[float, Said]] = []
@@ -76,13 +79,14 @@ class Known:
 
     def _begin(self) -> None:
         """As it was before anything was seen, with the clues that stand."""
-        grid, prior, outside = self._grid, self._grid.prior, self._grid.outside
+        grid, outside = self._grid, self._grid.outside
+        prior = assumed = self._assumed()
         for news in self.news:
             if news.role == "clue":
                 prior = prior.copy()
                 prior[news.cells[:, 0], news.cells[:, 1]] *= news.values
-        if prior is not grid.prior:
-            mass = (1.0 - grid.outside) * float(prior.sum()) / float(grid.prior.sum())
+        if prior is not assumed:
+            mass = (1.0 - grid.outside) * float(prior.sum()) / float(assumed.sum())
             outside = grid.outside / (grid.outside + mass)
         self.time: float | None = None
         """Of the last word, seconds since the epoch; None before the first, and wherever the target stands still."""
@@ -93,6 +97,15 @@ class Known:
         self.alarms = Alarms(*self._rates)
         self.confirmed: Cell | None = None
         """The place that an operator said is the target's."""
+
+    def _assumed(self) -> FloatArray:
+        """The prior of the area file, float [rows, cols], without what is refuted."""
+        refuted = frozenset(news.prior for news in self.news if news.role == "refute")
+        if not refuted:
+            return self._grid.prior
+        if refuted not in self._priors:
+            self._priors[refuted] = self._grid.prior_without(refuted)
+        return self._priors[refuted]
 
     @property
     def news(self) -> list[FieldNews]:

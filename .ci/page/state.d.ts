@@ -95,6 +95,11 @@ interface FoundState {
   confirmed: boolean;
 }
 
+interface GeometryState {
+  type: string;
+  coordinates: any[];
+}
+
 interface GoalState {
   pos: number;
   reached: boolean;
@@ -114,6 +119,7 @@ interface NewsState {
   lat: number;
   lon: number;
   cells: number;
+  geometry: GeometryState | null;
 }
 
 interface NextState {

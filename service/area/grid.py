@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -12,9 +13,10 @@ from scipy import ndimage
 
 from service.area import route
 from service.area.checks import check_launch
+from service.area.document import name_in
 from service.area.frame import BoolArray, GridFrame, lay_frame
 from service.area.geojson import Where
-from service.area.model import SearchArea, TargetMotion
+from service.area.model import Prior, SearchArea, TargetMotion, prior_shape
 from service.area.prior import area_prior, cell_squares, covered_fraction
 from service.area.projection import FloatArray, surface_m2
 from service.area.route import KeepOut
@@ -83,6 +85,8 @@ class Grid:
     target: TargetMotion | None = None
     mobility: FloatArray | None = None
     coordinates: Coordinates = "degrees"
+    area: SearchArea | None = None
+    """What the prior was made from; None: it is not that of an area file."""
     cut_off: str = ""
     """Where the ground is that exclusions told in flight have cut off, for people; empty: there is none."""
 
@@ -230,7 +234,26 @@ class Grid:
             raise BadInput(
                 "the prior has no mass on any cell that is searched; give one that covers the area."
             )
-        return replace(self, prior=_frozen(mass / mass.sum()))
+        return replace(self, prior=_frozen(mass / mass.sum()), area=None)
+
+    @functools.cached_property
+    def prior_places(self) -> dict[str, LatLon]:
+        """The parts of the area file's prior by what people call them, with the middle of each, in the file's order."""
+        parts = () if self.area is None else self.area.priors
+        middles = {_called(part): prior_shape(part).centroid for part in parts}
+        return {name: (float(middle.y), float(middle.x)) for name, middle in middles.items()}
+
+    def prior_without(self, names: Collection[str]) -> FloatArray:
+        """The prior, float [rows, cols], as it would be without the parts of these names in the area file."""
+        assert self.area is not None
+        priors = tuple(part for part in self.area.priors if _called(part) not in names)
+        area, squares = replace(self.area, priors=priors), cell_squares(self.frame)
+        return _frozen(area_prior(area, self.frame, squares, self.covered, self.searchable, self.mobility))
+
+
+def _called(part: Prior) -> str:
+    """What people call a part of the prior."""
+    return name_in(part.label) or part.label
 
 
 def build_grid(
@@ -320,6 +343,7 @@ def build_grid(
         outline=outline,
         layout_notes=crossed + notes,
         clearance_m=clearance_m,
+        area=area,
         target=area.target,
         coordinates=coordinates,
     )

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import shapely
 
+from service.area.document import name_in
 from service.area.prior import cell_squares
 from service.export.gaps import find_gaps
 from service.export.model import ExportedFind, ExportedRun, Fix
 from service.export.wishes import Wishes
-from service.view.names import name_in
 from service.view.shapes import on_earth
 
 _CORNERS = 48

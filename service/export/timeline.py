@@ -49,7 +49,7 @@ def timeline(entries: Iterable[Entry], settings: Settings) -> Iterator[TimelineE
 
 def _called(news: FieldNews) -> str:
     """A piece of news as people know it."""
-    return f"{ROLE_WORDS[news.role]}, {news.words or news.id}"
+    return f"{ROLE_WORDS[news.role]}, {news.words or news.prior or news.id}"
 
 
 def _of_an_aircraft(said: KnownRow | UnknownRow) -> Iterator[tuple[str, str]]:

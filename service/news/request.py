@@ -67,6 +67,14 @@ class Excluded(Told):
     words: str = Field(default="", max_length=200, description="why, for people")
 
 
+class Refuted(Told):
+    """A part of the area file's prior that proved wrong, such as a phone fix; it has no geometry."""
+
+    role: Literal["refute"]
+    prior: str = Field(min_length=1, max_length=200, description="its name in the area file")
+    words: str = Field(default="", max_length=200, description="why, for people")
+
+
 class Shape(Told):
     """A geometry as RFC 7946 has it, longitude first."""
 
@@ -81,8 +89,8 @@ class NewsRequest(DoorModel):
 
     type: Literal["Feature"]
     id: str | None = Field(default=None, min_length=1, max_length=64)
-    geometry: Shape
-    properties: Annotated[Clue | Searched | Excluded, Field(discriminator="role")]
+    geometry: Shape | None = None
+    properties: Annotated[Clue | Searched | Excluded | Refuted, Field(discriminator="role")]
 
     @model_validator(mode="before")
     @classmethod
@@ -103,7 +111,12 @@ class NewsRequest(DoorModel):
     def _it_can_be(self) -> Self:
         if self.id in (".", ".."):
             raise ValueError(f"the id {self.id!r} cannot stand in an address; give it another one")
-        kind, said = self.geometry.type, self.properties
+        said = self.properties
+        if isinstance(said, Refuted):
+            return self
+        if self.geometry is None:
+            raise ValueError(f"news of the role {said.role!r} needs a geometry")
+        kind = self.geometry.type
         flat = kind in ("Polygon", "MultiPolygon")
         if not isinstance(said, Clue) and not flat:
             what = "an exclusion" if isinstance(said, Excluded) else "ground that was searched"
@@ -122,6 +135,7 @@ class NewsRequest(DoorModel):
 
     def shape(self) -> shapely.Geometry:
         """The geometry in degrees, x = longitude. Raises BadInput."""
+        assert self.geometry is not None
         where, kind = Where("the news", "its geometry"), self.geometry.type
         whole = self.geometry.model_dump()
         if kind == "Point":
@@ -137,7 +151,10 @@ class NewsRequest(DoorModel):
 
         An exclusion says nothing of cells; it may lie beside the area, on the way home.
         """
-        shape, said = self.shape(), self.properties
+        said = self.properties
+        if isinstance(said, Refuted):
+            return _refuted(grid, said, name)
+        shape = self.shape()
         cells, told = np.empty((0, 2), dtype=np.int64), np.empty(0)
         off = apart_m(grid, shape)  # what lies on the other side of the earth is projected into the area
         if isinstance(said, Excluded):
@@ -160,11 +177,15 @@ class NewsRequest(DoorModel):
                 f"the news is about {len(cells)} cells, at most {MOST_CELLS} are taken; make it smaller"
             )
         middle = shape.centroid
-        ground = shape if isinstance(shape, shapely.MultiPolygon) else None
-        return FieldNews(name, said.role, said.words, (middle.y, middle.x), cells, told, ground)
+        return FieldNews(name, said.role, said.words, (middle.y, middle.x), cells, told, shape)
 
 
-_OF_ROLES: dict[str, type[DoorModel]] = {"clue": Clue, "searched": Searched, "exclude": Excluded}
+_OF_ROLES: dict[str, type[DoorModel]] = {
+    "clue": Clue,
+    "searched": Searched,
+    "exclude": Excluded,
+    "refute": Refuted,
+}
 
 
 def _refuse_near_misses(properties: Any) -> None:
@@ -177,6 +198,16 @@ def _refuse_near_misses(properties: Any) -> None:
             raise ValueError(f"a piece of news of the role {properties['role']!r} has no {name!r}")
         if near := difflib.get_close_matches(str(name).lower(), sorted(ours), n=1, cutoff=_NEAR_MISS):
             raise ValueError(f"there is no property {shown(str(name))}; did you mean {near[0]!r}?")
+
+
+def _refuted(grid: Grid, said: Refuted, name: str) -> FieldNews:
+    """What is not assumed any more. Raises BadInput when nothing of that name was."""
+    known = grid.prior_places
+    if said.prior not in known:
+        there = f"there is {', '.join(map(shown, known))}" if known else "its prior has no parts"
+        raise BadInput(f"there is no prior {shown(said.prior)} in the area file; {there}")
+    nothing = np.empty((0, 2), dtype=np.int64), np.empty(0)
+    return FieldNews(name, "refute", said.words, known[said.prior], *nothing, prior=said.prior)
 
 
 def apart_m(grid: Grid, shape: shapely.Geometry) -> float:
@@ -229,6 +260,11 @@ EXAMPLES: dict[str, dict[str, Any]] = {
             ],
         },
         "properties": {"role": "exclude", "words": "helicopter landing site"},
+    },
+    "a prior that proved wrong": {
+        "type": "Feature",
+        "geometry": None,
+        "properties": {"role": "refute", "prior": "phone fix", "words": "it was of another phone"},
     },
 }
 """News that the schema shows, by what they say."""

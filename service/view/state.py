@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NotRequired
+from typing import Any, NotRequired
 
 from typing_extensions import TypedDict  # what pydantic can read on Python 3.11
 
@@ -172,9 +172,17 @@ class SortieState(TypedDict):
     autopilot: str | None
 
 
+class GeometryState(TypedDict):
+    """A GeoJSON geometry (RFC 7946), longitude first."""
+
+    type: str
+    coordinates: list[Any]
+
+
 class NewsState(TypedDict):
-    """A piece of news that stands: its id, role ("clue", "searched" or "exclude"), words, the middle of its place, and
-    how many cells it is about (an exclusion says nothing of any)."""
+    """A piece of news that stands: its id, role ("clue", "searched", "exclude" or "refute"), words, the middle of its
+    place, how many cells it is about (an exclusion says nothing of any), and its shape for maps, of fewer corners where
+    it has many; null where there is none, and in a run of an early version."""
 
     id: str
     role: str
@@ -182,6 +190,7 @@ class NewsState(TypedDict):
     lat: float
     lon: float
     cells: int
+    geometry: GeometryState | None
 
 
 class HeardState(TypedDict):

@@ -10,6 +10,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -20,6 +21,7 @@ from service.errors import BadInput
 from service.evidence.observe import Observation
 from service.journal import Row
 from service.known import Judgement, Known, Said, Withdrawn
+from service.news.bearing import FieldNews
 from service.news.request import EXAMPLES, FARTHEST_M, MOST_CELLS, NewsRequest, apart_m, news_schema
 from service.rows import NewsRow, WithdrawnRow
 from tests.integration.flight import FIELD
@@ -166,6 +168,53 @@ def test_the_journal_keeps_every_bit() -> None:
             assert np.array_equal(back.news.values, news.values)
 
 
+HOLE = [[8.3003, 47.0502], [8.3005, 47.0502], [8.3005, 47.0504], [8.3003, 47.0504], [8.3003, 47.0502]]
+
+
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        {"type": "Point", "coordinates": [8.3006, 47.0507]},
+        {
+            "type": "MultiPolygon",
+            "coordinates": [
+                [*[[[8.3, 47.05], [8.301, 47.05], [8.301, 47.051], [8.3, 47.051], [8.3, 47.05]]], HOLE],
+                [[[8.302, 47.05], [8.3022, 47.05], [8.3022, 47.0502], [8.302, 47.0502], [8.302, 47.05]]],
+            ],
+        },
+    ],
+)
+def test_the_journal_keeps_the_shape_and_an_early_one_is_read_without(geometry: dict[str, Any]) -> None:
+    clue = {"bayes_factor": 5.0, **({"sigma_m": 20.0} if geometry["type"] == "Point" else {})}
+    news = told("clue", geometry, **clue).news(GRID, "a")
+    body = json.loads(as_json(NewsRow(news)))
+    back = read_news(body)
+    assert back.drawn == news.drawn
+    assert shapely.equals(shapely.geometry.shape(back.drawn), shapely.geometry.shape(geometry))
+    shape = body.pop("shape")
+    early = read_news(body | ({"ground": shape["coordinates"]} if news.ground is not None else {}))
+    assert early.ground == news.ground
+    assert early.says_as(news)
+    assert (early.drawn is None) == (geometry["type"] == "Point")
+
+
+def test_a_shape_of_many_corners_is_drawn_with_few() -> None:
+    ring = shapely.Point(8.301, 47.0507).buffer(0.0005, quad_segs=2000)
+    news = told("exclude", json.loads(shapely.to_geojson(ring))).news(GRID, "a")
+    assert news.drawn is not None
+    drawn = shapely.geometry.shape(news.drawn)
+    assert 10 < shapely.get_num_coordinates(drawn) <= 500
+    assert shapely.hausdorff_distance(drawn, news.ground) < 2e-5
+    assert news.ground is not None
+    assert shapely.get_num_coordinates(news.ground) > 8000
+
+
+def read_news(body: dict[str, Any]) -> FieldNews:
+    row = understood(Row(1, 2.0, "news", None, body), Path("journal")).said
+    assert isinstance(row, NewsRow)
+    return row.news
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -262,6 +311,68 @@ def test_a_clue_may_be_at_several_points() -> None:
     for lon, lat in points["coordinates"]:
         cell = GRID.frame.to_cells([(lat, lon)])[0]
         assert news.values[(news.cells == cell).all(axis=1)] > 7.0
+
+
+def clued_area() -> Grid:
+    """The field with two more parts of its prior, and an order of magnitude between their weights."""
+    area: dict[str, Any] = json.loads(json.dumps(FIELD))
+    for name, place_, weight in (("phone fix", [8.3004, 47.0512], 10.0), ("hut", [8.3022, 47.0503], 1.0)):
+        point = {"type": "Point", "coordinates": place_}
+        said = {"role": "prior", "name": name, "sigma_m": 20, "weight": weight}
+        area["features"].append({"type": "Feature", "geometry": point, "properties": said})
+    return build_grid(parse_area(json.dumps(area).encode(), source="field"), 10.0)
+
+
+PARTS = clued_area()
+
+
+def refuted(prior: str, name: str = "r") -> FieldNews:
+    said = {"role": "refute", "prior": prior, "words": "of another phone"}
+    feature = {"type": "Feature", "geometry": None, "properties": said}
+    return NewsRequest.model_validate(feature).news(PARTS, name)
+
+
+def test_a_prior_that_is_refuted_was_never_assumed_and_one_click_undoes_it_to_the_last_bit() -> None:
+    looks = [look(each, hit=each == 30) for each in range(0, 200, 3)]
+    clue = request().news(PARTS, "a")
+    never, whole = Known(PARTS, 0.9, 0.95), Known(PARTS, 0.9, 0.95)
+    for each in (*looks[:20], clue, *looks[20:]):
+        never.take(each)
+    for said in (*looks[:20], refuted("phone fix"), clue, *looks[20:], Withdrawn("r")):
+        whole.take(said)
+    assert whole.belief.digest() == never.belief.digest()
+    assert whole.record.pos == never.record.pos
+
+
+def test_without_a_prior_the_rest_stands_as_the_area_file_has_it() -> None:
+    whole = Known(PARTS, 0.9, 0.95)
+    whole.take(refuted("phone fix"))
+    rest = PARTS.prior_without({"phone fix"})
+    assert whole.belief.probability() == pytest.approx(rest * (1.0 - PARTS.outside))
+    assert whole.belief.outside == pytest.approx(PARTS.outside)
+    row, col = PARTS.frame.to_cells([(47.0512, 8.3004)])[0]
+    assert rest[row, col] < 0.01 * PARTS.prior[row, col]
+    for name in [next(iter(PARTS.prior_places)), "hut"]:
+        whole.take(refuted(name, name))
+    ground = np.where(PARTS.searchable, PARTS.covered, 0.0)
+    assert whole.belief.probability() == pytest.approx(ground / ground.sum() * (1.0 - PARTS.outside))
+
+
+def test_a_prior_of_no_such_name_is_refused_with_those_there_are() -> None:
+    with pytest.raises(BadInput, match=r"no prior 'fone' in the area file; there is .*'phone fix', 'hut'"):
+        refuted("fone")
+    with pytest.raises(BadInput, match="its prior has no parts"):
+        NewsRequest.model_validate(EXAMPLES["a prior that proved wrong"]).news(
+            GRID.with_prior(GRID.prior), "a"
+        )
+    with pytest.raises(ValidationError, match="of the role 'exclude' needs a geometry"):
+        NewsRequest.model_validate({"type": "Feature", "geometry": None, "properties": {"role": "exclude"}})
+
+
+def test_the_journal_keeps_what_is_refuted() -> None:
+    news = refuted("hut")
+    back = read_news(json.loads(as_json(NewsRow(news))))
+    assert (back.prior, back.says_as(news), back.says_as(refuted("phone fix"))) == ("hut", True, False)
 
 
 def test_the_shipped_schema_is_the_one_that_is_checked_and_its_examples_are_good() -> None:

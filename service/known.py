@@ -134,15 +134,22 @@ class Known:
         self._said.append((moment, said))
         if isinstance(said, (FieldNews, Withdrawn)):
             self._field.append(said)
-            self._kept = []
-            self._begin()
-            self._believe_all(self._said)
+            if self._moves(said):
+                self._kept = []
+                self._begin()
+                self._believe_all(self._said)
             self.told_mass = self.belief.probability()
         elif self._is_late(moment):
             self._believe_all(self._go_back(moment))
         else:
             self._believe(said, moment)
             self._keep()
+
+    def _moves(self, said: FieldNews | Withdrawn) -> bool:
+        """Whether news, or news taken back, may change what is believed: an exclusion says nothing of the target, and
+        where that stands still the time at which it is told says nothing either."""
+        news = self.heard_as(said.id) if isinstance(said, Withdrawn) else said
+        return self._grid.walk is not None or news is None or news.role != "exclude"
 
     @property
     def kept(self) -> int:

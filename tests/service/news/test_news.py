@@ -150,6 +150,21 @@ def test_news_that_are_taken_back_leave_no_trace_to_the_last_bit(sayings: list[A
     assert [news.id for news in whole.news] == [news.id for news in other.news]
 
 
+def test_an_exclusion_says_nothing_of_the_target_and_nothing_is_reckoned_anew_for_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looks = [look(each, hit=each == 30) for each in range(0, 200, 3)]
+    never, whole = known(*looks), known(*looks[:20])
+    monkeypatch.setattr(Known, "_believe_all", None)  # what calls it fails
+    whole.take(told("exclude", square(8.301, 47.05)).news(GRID, "lz"))
+    for each in looks[20:]:
+        whole.take(each)
+    assert [each.id for each in whole.excluded] == ["lz"]
+    whole.take(Withdrawn("lz"))
+    assert whole.excluded == []
+    assert whole.belief.digest() == never.belief.digest()
+
+
 def test_a_copy_goes_its_own_way() -> None:
     news = request().news(GRID, "a")
     whole = known(news)

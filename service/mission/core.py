@@ -44,7 +44,7 @@ from service.mission.effects import (
     row,
 )
 from service.mission.entering import entered, phase_of
-from service.mission.finding import found_after_all, over_for_all
+from service.mission.finding import found_after_all, not_enough_after_all, over_for_all
 from service.mission.flight import Flight
 from service.mission.grounded import Grounded
 from service.mission.guard import CRITICAL, guard
@@ -83,7 +83,9 @@ from service.mission.phase import (
     Settle,
     Stand,
     Stay,
+    Unsettle,
     Wish,
+    say,
     warn,
 )
 from service.mission.reserve import Reserve
@@ -94,6 +96,7 @@ from service.mission.states import (
     FLYING,
     MAY_MOVE,
     MOVING,
+    SEARCHED_TO,
     Event,
     State,
     next_state,
@@ -183,6 +186,8 @@ class MissionCore:
                 self._ended(news)
             case _:
                 self._want(self._watch.read(news, self._look()))
+        if isinstance(news, MapChanged):
+            self._want(not_enough_after_all(self._look()))
         self._want(self._watch.landed(self._look()))
         its_own = isinstance(news, (Thought, NotThought, Hit, MapChanged)) or (
             isinstance(news, (Done, Failed)) and not ordered_it
@@ -361,11 +366,16 @@ class MissionCore:
             case GoOn():
                 self._want(self._logbook.goes_on(self._seen, now))
             case Settle(why=""):
-                self._change(settled=True)
+                self._change(settled=True, enough=False)
             case Settle(why=why):
-                self._change(settled=True, searched=True, why_stopped=why)
+                enough = why.startswith(SEARCHED_TO)
+                self._change(settled=True, searched=True, why_stopped=why, enough=enough)
                 state = self.standing.state  # which stays; that no sortie follows has to outlive the process
                 self._emit(WriteRow(TransitionRow(state, Event.FINISH, state, why)))
+            case Unsettle(why=why):
+                self._change(settled=False, enough=False, why_stopped=why)
+                state = self.standing.state
+                self._emit(WriteRow(TransitionRow(state, Event.RESUME, state, why)))
             case Lost():
                 self._phase.lost(self._look())
             case Stay(why=why):
@@ -550,10 +560,16 @@ class MissionCore:
 
     def _fly_around(self, grid: Grid) -> None:
         """Other ground is excluded now: a leg that would cross it is stopped here, before it is planned anew."""
-        t = self._seen.telemetry
+        t, known = self._seen.telemetry, self.chart.grid.layout_notes
         self.chart.take(grid)
+        for note in grid.layout_notes:
+            if note not in known:
+                self._want(say(note, self._look()))
         crosses = self.helm.crosses(t)
         self.helm.regrid()
+        hovers = self.standing.state in (State.HOLDING, State.FOUND) and not on_ground(t)
+        if hovers and self.chart.excluded(here(t)):
+            self._want(warn("it hovers over ground that is excluded now", self._look()))
         if crosses and self.standing.state in MOVING and not self.standing.goes_home_by_itself:
             self._emit(
                 Note("the leg that was flown crosses ground that is excluded now: stopping first", _WARNING)

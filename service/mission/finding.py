@@ -15,7 +15,7 @@ from service.chances import sure
 from service.evidence.found import Found
 from service.geometry import distance_m
 from service.mission.effects import Stop, WriteRow
-from service.mission.phase import Find, Happen, Phase, Settle, Wish, say
+from service.mission.phase import Find, Happen, Phase, Settle, Unsettle, Wish, say
 from service.mission.standing import Look
 from service.mission.states import Event, State
 from service.rows import FoundRow
@@ -82,6 +82,15 @@ def over_for_all(look: Look) -> Iterator[Wish]:
         yield Happen(Event.FINISH, why, stopped=why, searched=True)
     else:
         yield Settle(why)
+
+
+def not_enough_after_all(look: Look) -> Iterator[Wish]:
+    """See whether news, or news taken back, leave less searched than the search ended for."""
+    seen = look.seen
+    if look.standing.enough and seen.searched < seen.enough:
+        why = f"by the news only POS {sure(seen.searched)} is searched: the search is not over"
+        yield Unsettle(why)
+        yield from say(why, look)
 
 
 class OverThePlace(Phase):

@@ -114,6 +114,13 @@ class Settle:
 
 
 @dataclass(frozen=True, slots=True)
+class Unsettle:
+    """A sortie may follow the one under way all the same, for this reason."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class Stay:
     """The state stays, for one more reason."""
 
@@ -152,6 +159,7 @@ Wish = (
     | Stand
     | GoOn
     | Settle
+    | Unsettle
     | Stay
     | Overtaken
     | Pending

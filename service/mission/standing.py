@@ -27,6 +27,7 @@ class Standing:
         why_stopped: why the search ended or the run was broken off; empty while it goes on.
         searched: the search ended because there was nothing more to gain, not by an order.
         settled: nothing is left to fly for: it was searched enough, found, or an operator has finished it.
+        enough: it is settled because it was searched enough, which news may change.
         found: the place that counts as found.
         causes: what it holds for; the hold ends when none is left.
         homeward: it flies home, or holds on the way there, or waits after a restart that found it so.
@@ -41,6 +42,7 @@ class Standing:
     why_stopped: str = ""
     searched: bool = False
     settled: bool = False
+    enough: bool = False
     found: Found | None = None
     causes: frozenset[str] = frozenset()
     homeward: bool = False

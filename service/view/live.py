@@ -14,7 +14,7 @@ from prometheus_client import CollectorRegistry, Gauge, Histogram
 
 from service.area import SearchArea
 from service.clock import Clock
-from service.config import Settings
+from service.config import ONLY, Settings
 from service.errors import BadInput, shown
 from service.evidence.counts import Counts
 from service.evidence.observe import FramePose, finite_or_level
@@ -26,6 +26,7 @@ from service.mavlink.modes import mode_title
 from service.mission.mission import Mission
 from service.mission.situation import on_ground
 from service.mission.states import State
+from service.news.bearing import FieldNews
 from service.news.request import NewsRequest, refuse_other
 from service.search import Search
 from service.squad import Squad
@@ -169,9 +170,9 @@ class RunView(BaseView):
             news = await asyncio.to_thread(request.news, self.search.grid, name)
             if (before := known.heard_as(name)) is not None:
                 refuse_other(news, before, stands=before in known.news)
-                return {"id": name, "status": "duplicate", "cells": 0}
-            await self._begun().hear(news)
-            return {"id": name, "status": "accepted", "cells": len(news.cells)}
+                return {"id": name, "status": "duplicate", "cells": 0, "notes": []}
+            notes = await self._heard(news)
+            return {"id": name, "status": "accepted", "cells": len(news.cells), "notes": notes}
 
     async def withdraw(self, name: str) -> HeardState:
         """News are taken back. Raises BadInput, JournalLost."""
@@ -181,8 +182,14 @@ class RunView(BaseView):
                 raise BadInput(
                     f"there is no news {shown(name)} that could be taken back; /api/state tells which stand"
                 )
-            await self._begun().hear(Withdrawn(name))
-            return {"id": name, "status": "withdrawn", "cells": standing[name]}
+            notes = await self._heard(Withdrawn(name))
+            return {"id": name, "status": "withdrawn", "cells": standing[name], "notes": notes}
+
+    async def _heard(self, said: FieldNews | Withdrawn) -> list[str]:
+        """Let all of them hear news; what there is to note of the ground that was not so before."""
+        known = self.search.grid.layout_notes
+        await self._begun().hear(said)
+        return [note for note in self.search.grid.layout_notes if note not in known]
 
     def _begun(self) -> Squad:
         if self.squad is None:
@@ -226,7 +233,7 @@ class RunView(BaseView):
             "outside": self.search.belief.outside,
             "steps": mission.flight.steps if mission else 0,
             "flight_time_s": flown,
-            "sorties": sortie_states(mission.flight.sorties) if mission else [],
+            "sorties": sortie_states(mission.flight.sorties, mission.name or ONLY) if mission else [],
             "news": news_states(self.search.known.news),
             "flight_left_s": self._flight_left(flown),
             "battery_percent": telemetry.battery_percent if telemetry else None,
@@ -279,6 +286,7 @@ class RunView(BaseView):
             "ahead": mission.ahead(),
             "steps": mission.flight.steps,
             "flight_time_s": mission.flight_time(),
+            "sorties": sortie_states(mission.flight.sorties, name),
             "pose": pose_state(pose, self.settings.run.coordinates),
             "footprint": self.footprint(pose, mission.name),
         }

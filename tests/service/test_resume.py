@@ -132,6 +132,30 @@ def test_a_search_that_an_operator_finished_on_the_way_home_stays_finished_acros
     assert not left_standing(journal_of(tmp_path / "not", LOW), Search(GRID, Settings())).settled
 
 
+def test_a_search_that_news_ended_and_were_taken_back_goes_on_across_a_kill(tmp_path: Path) -> None:
+    again = ("RETURNING", "resume", "RETURNING")
+    settled = left_standing(journal_of(tmp_path / "a", SEARCHED), Search(GRID, Settings()))
+    assert (settled.settled, settled.enough) == (True, True)
+    steps = [*SEARCHED, again]
+    standing = left_standing(journal_of(tmp_path / "b", steps), Search(GRID, Settings()))
+    assert (standing.state, standing.settled, standing.enough) == (State.RETURNING, False, False)
+    assert why_over(journal_of(tmp_path / "c", [*steps, LANDED])) == ""
+    assert not left_standing(
+        journal_of(tmp_path / "d", [*SEARCHED, FINISHED]), Search(GRID, Settings())
+    ).enough
+
+
+def test_a_search_is_not_said_to_be_finished_by_an_operator_who_has_not_asked(tmp_path: Path) -> None:
+    for number, (why, told) in enumerate(
+        {
+            "searched to POS 95 %": "searched to POS 95 %",
+            "the operator asked": "the operator finished the search",
+        }.items()
+    ):
+        steps = [("WAITING", "linked", "READY"), ("READY", "finish", "DONE")]
+        assert why_over(journal_of(tmp_path / str(number), steps, why=why)) == told
+
+
 def test_what_was_flown_goes_on_across_processes(tmp_path: Path) -> None:
     track = [[1001.0, 47.0, 8.3, 15.0], [1002.0, 47.0001, 8.3, 15.0]]
     first = {"seconds": 40.0, "earlier_s": 0.0, "steps": 3, "track": track}

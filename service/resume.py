@@ -21,7 +21,7 @@ from service.journal import read_meta, read_meta_if_any
 from service.known import Judgement, Withdrawn
 from service.mission.flight import Flight
 from service.mission.orders import ASKED, FINISHED
-from service.mission.standing import Standing
+from service.mission.standing import Standing, as_asked
 from service.mission.states import FINAL, FLYING, MAY_MOVE, SETTLED, Event, State
 from service.rows import (
     CommandRow,
@@ -216,6 +216,9 @@ def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standi
         if row.after in (State.READY, State.ABORTED):
             continue
         settled = standing.settled or row.event in SETTLED
+        if row.after == row.before == State.WAITING:  # what was wanted before the aircraft was heard
+            standing = as_asked(standing, row.event, row.reason) or standing
+            continue
         if row.after == row.before:  # nothing but that it is settled
             standing = replace(standing, settled=settled, searched=True, why_stopped=row.reason)
             continue

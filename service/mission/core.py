@@ -67,6 +67,7 @@ from service.mission.news import (
 from service.mission.orders import judged, ordered, sensible
 from service.mission.phase import (
     Begin,
+    ComeUp,
     Enter,
     Find,
     GiveUp,
@@ -88,7 +89,7 @@ from service.mission.phase import (
 )
 from service.mission.reserve import Reserve
 from service.mission.situation import Situation, on_ground
-from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing, Terms
+from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing, Terms, as_asked
 from service.mission.states import (
     FINAL,
     FLYING,
@@ -374,6 +375,8 @@ class MissionCore:
             case GiveUp(reason=reason):
                 self._emit(Note(reason, logging.ERROR))
                 self._give_up(reason, stop=True, then="hovering")
+            case ComeUp():
+                self._come_up(wish)
             case Overtaken():
                 self._overtake(wish)
             case Pending():
@@ -485,6 +488,23 @@ class MissionCore:
             self._happen(Happen(Event.RETURN, wish.reason, stopped="the autopilot was silent"))
         else:
             self._happen(Happen(Event.RETURN if self.standing.homeward else Event.RESUME, wish.reason))
+
+    def _come_up(self, wish: ComeUp) -> None:
+        """What a person wants of an aircraft that is not heard yet is as good as done, whatever a flag says later."""
+        asked = as_asked(self._left, wish.event, wish.why)
+        if asked is not None:
+            self._left = asked
+            homeward = self.standing.homeward or asked.goes_home
+            said = f"it will be {asked.state} once it is heard: {wish.why}"
+            self._change(why=said, homeward=homeward, settled=asked.settled)
+            self._change(why_stopped=asked.why_stopped, searched=asked.searched)
+            state = self.standing.state
+            self._emit(WriteRow(TransitionRow(state, wish.event, state, wish.why)))
+            self._emit(Note(said))
+        elif wish.event == Event.FINISH:
+            self._happen(Happen(wish.event, wish.why, stopped=wish.why, searched=True))
+        refused = "" if asked is not None or wish.event == Event.FINISH else self._left.state
+        self._emit(Answer(wish.ticket, f"there is nothing to {wish.event} in {refused}" if refused else ""))
 
     def _give_up(self, reason: str, *, stop: bool, then: str) -> None:
         before = self.standing.state

@@ -108,6 +108,11 @@ def test_a_run_that_is_over_is_not_gone_on_with(tmp_path: Path) -> None:
         ([*UP, ("SEARCHING", "abort", "ABORTED")], State.SEARCHING),
         (FOUND, State.RETURNING),
         ([*LOW, LANDED], State.WAITING),
+        ([("WAITING", "hold", "WAITING")], State.HOLDING),  # ordered before it was heard
+        ([("WAITING", "hold", "WAITING"), ("WAITING", "linked", "READY")], State.HOLDING),
+        ([*UP, ("WAITING", "return", "WAITING")], State.RETURNING),
+        ([*UP, ("WAITING", "finish", "WAITING")], State.RETURNING),
+        ([*TAKEN, ("WAITING", "hold", "WAITING")], State.YIELDED),
     ],
 )
 def test_a_run_is_taken_up_as_it_was_left(steps: Sequence[Step], state: State, tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ from service.mission.news import (
     Order,
     Thought,
 )
-from service.mission.orders import judged, ordered, sensible
+from service.mission.orders import concerned, judged, ordered, sensible
 from service.mission.phase import (
     Begin,
     ComeUp,
@@ -267,6 +267,10 @@ class MissionCore:
     def orders(self, seen: Situation) -> list[str]:
         """The orders that would change something now."""
         return sensible(replace(self._look(), seen=seen))
+
+    def concerned(self, command: str, seen: Situation) -> bool:
+        """Whether an order means something now."""
+        return concerned(command, replace(self._look(), seen=seen))
 
     # ---- wishes
 

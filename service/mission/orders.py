@@ -117,6 +117,13 @@ def sensible(look: Look) -> list[str]:
     ]
 
 
+def concerned(command: str, look: Look) -> bool:
+    """Whether an order means something now, be it that it is carried out already; whether it may be is another
+    question."""
+    stops = command in STOPPING and bool(look.ordered)
+    return stops or not _senseless(command, look.standing.state, on_ground(look.seen.telemetry))
+
+
 def _is_so(command: str, state: State) -> bool:
     """Whether an order asks for what is already done; a second finish still ends the search."""
     return command != "finish" and state in _SO_ALREADY.get(command, ())

@@ -262,6 +262,8 @@ def left_flight(journal: Path, search: Search, whose: Whose = ALONE) -> Flight:
             case FlightRow() as row:
                 flight.recall(row, entry.time)
                 flight.by = vehicle
+            case CommandRow(command="reposition", lat=float(lat), lon=float(lon)):
+                flight.goal = lat, lon
             case TransitionRow(after=state):
                 flight.flown |= state in MAY_MOVE
             case VehicleRow(system_id=system_id, autopilot=autopilot):

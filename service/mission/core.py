@@ -13,6 +13,7 @@ nothing.
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -89,7 +90,7 @@ from service.mission.phase import (
 )
 from service.mission.reserve import Reserve
 from service.mission.situation import Situation, on_ground
-from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing, Terms, as_asked
+from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing, Terms, as_asked, may_be_aloft
 from service.mission.states import (
     FINAL,
     FLYING,
@@ -250,6 +251,9 @@ class MissionCore:
 
     def told(self, seen: Situation, now: float) -> Other:
         """This aircraft as the other aircraft of the search are to see it: in the air from when it is about to be."""
+        if not math.isfinite(seen.telemetry.heartbeat_time) and may_be_aloft(self._left, self.flight):
+            climbs = self._left.state == State.TAKEOFF
+            return self.helm.traffic.unheard(seen.telemetry, now, self.flight, climbs=climbs)
         standing, heard = self.standing, now - seen.telemetry.heartbeat_time < self.terms.heartbeat_fresh_s
         course = Course(
             standing.state == State.TAKEOFF,
@@ -304,6 +308,7 @@ class MissionCore:
         """The energy of a flight that has not begun."""
         return Reserve(self.chart, self.settings.flight, self.helm.heights.highest_return_m)
 
+        self._left = Standing()
     def _see(self, seen: Situation, now: float) -> None:
         self._seen, self._now = seen, now
         self.helm.reckon(seen.telemetry)

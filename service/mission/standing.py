@@ -90,6 +90,12 @@ def as_asked(left: Standing, event: Event, why: str) -> Standing | None:
     )
 
 
+def may_be_aloft(left: Standing, flight: Flight) -> bool:
+    """Whether an aircraft may be in the air of which is known only how an earlier process left its run."""
+    flew = left.state in (*_ALOFT, State.YIELDED) and flight.aloft_s(flight.left_at) > 0.0
+    return flew or left.state == State.TAKEOFF
+
+
 @dataclass(frozen=True, slots=True)
 class Terms:
     """On what terms a mission flies: how fast its clock runs, how old a position and a heartbeat may be (seconds),

@@ -152,6 +152,7 @@ def test_what_was_flown_goes_on_across_processes(tmp_path: Path) -> None:
     assert (flight.seconds(5000.0), flight.steps, flight.decisions, flight.waypoints) == (45.0, 5, 1, 1)
     assert len(flight.track) == 3
     assert flight.flown
+    assert flight.goal == (47.0, 8.3)
 
 
 def test_who_flew_what_and_how_far_the_rows_tell_is_taken_up(tmp_path: Path) -> None:

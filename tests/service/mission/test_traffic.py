@@ -9,14 +9,16 @@ from typing import Any
 import pytest
 
 from service.mavlink.events import Target
+from service.mavlink.telemetry import Telemetry
 from service.mission.apart import SETTLES_S, Claim, Other, Room, Spacing, home_by_s, objection
 from service.mission.core import MissionCore
 from service.mission.effects import Arm, EnterGuided, Note, ReturnToLaunch, SendWaypoint, Stop
+from service.mission.flight import Flight
 from service.mission.news import NotSent, Order
-from service.mission.standing import Terms
+from service.mission.standing import Standing, Terms
 from service.mission.states import State
 from sim.soak import ground
-from tests.service.mission.flown import GRID, HERE, ON_GROUND, Talk, place, reached, searching
+from tests.service.mission.flown import GRID, HERE, ON_GROUND, START, Talk, place, reached, searching
 
 HOME = ground.launch()
 FAR = place(20.0, 190.0)
@@ -392,6 +394,50 @@ def test_who_is_not_heard_or_is_flown_by_its_pilot_is_not_steered_and_its_place_
     told = other_one.core.told(other_one.seen, other_one.now)
     assert told.in_air
     assert not told.steered
+
+
+SPACING = Spacing.of(Talk().settings.flight, 2.0)
+LAST = place(180.0, 120.0)
+
+
+def left_behind(left: State, *, earlier_s: float = 0.0, seconds_ago: float = 10.0) -> Talk:
+    """A mission whose aircraft an earlier process flew, so long ago, and that has not been heard yet."""
+    flight = Flight(flown=True, carried_s=90.0, earlier_s=earlier_s, left_at=START - seconds_ago)
+    flight.track.append((START - seconds_ago, *LAST, 15.0))
+    flight.goal, flight.told_at = FAR, START - seconds_ago
+    talk = Talk(standing=Standing(state=left), flight=flight)
+    talk.sees(telemetry=Telemetry())
+    return talk
+
+
+@pytest.mark.parametrize(
+    "left", [State.SEARCHING, State.HOLDING, State.YIELDED, State.RETURNING, State.TAKEOFF]
+)
+def test_one_that_was_left_in_the_air_and_is_not_heard_yet_may_be_on_its_way_home(left: State) -> None:
+    talk = left_behind(left)
+    told = talk.core.told(talk.seen, talk.now)
+    assert (told.in_air, told.steered, told.place, told.up_m, told.age_s) == (True, False, LAST, 15.0, 10.0)
+    below = other(HOME, up=0.0, name="3")
+    through_its_way_home = below.sent(HOME, 15.0)
+    assert "not been heard for 10 s" in objection(below, through_its_way_home, (told,), SPACING)
+    later = talk.core.told(talk.seen, talk.now + SPACING.battery_s)
+    assert not objection(below, through_its_way_home, (later,), SPACING)
+
+
+def test_until_it_is_heard_it_may_fly_to_where_it_was_sent_last() -> None:
+    talk = left_behind(State.SEARCHING)
+    assert talk.core.told(talk.seen, talk.now).goals == (FAR,)
+    talk.sees(telemetry=searching().seen.telemetry)
+    heard = talk.core.told(talk.seen, talk.now)
+    assert (heard.place, heard.goals) == (HERE, ())
+
+
+@pytest.mark.parametrize(
+    ("left", "earlier_s"), [(State.GROUNDED, 90.0), (State.WAITING, 0.0), (State.HOLDING, 90.0)]
+)
+def test_one_that_was_left_on_the_ground_takes_no_room(left: State, earlier_s: float) -> None:
+    talk = left_behind(left, earlier_s=earlier_s)
+    assert not talk.core.told(talk.seen, talk.now).in_air
 
 
 def test_the_name_comes_with_the_terms() -> None:

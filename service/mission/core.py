@@ -590,6 +590,7 @@ class MissionCore:
             self._stop()
         elif self.standing.autopilot_returns and not self.chart.leg_allowed(here(t), self.chart.home(t)):
             said = "the autopilot's way home may cross ground that is excluded now"
+        self.reserve.forget_way()
             self._want([Note(said, _WARNING), Tell(f"search {self.standing.state}: {said}", 4)])
 
     def _decided(self, thought: Thought) -> None:

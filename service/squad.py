@@ -246,7 +246,7 @@ class Squad:
 def _lost(mission: Mission) -> bool:
     """Silent for long; on the ground between two sorties it may be switched off, and is waited for as the settings
     say."""
-    if mission.state == State.GROUNDED:
+    if mission.core.between_sorties:
         return False
     age = mission.clock.now() - mission.vehicle.telemetry.heartbeat_time
     return age > max(LOST_S, mission.core.terms.heartbeat_fresh_s)

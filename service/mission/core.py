@@ -268,6 +268,13 @@ class MissionCore:
             return []
         return [here(seen.telemetry), *self.chart.latlons([self._phase.waypoint, *self.path])]
 
+    @property
+    def between_sorties(self) -> bool:
+        """Whether it waits on the ground for the next sortie, or did so when an earlier process left it: its aircraft
+        may be switched off."""
+        waits = self.standing.state == State.WAITING and self._left.state == State.GROUNDED
+        return waits or self.standing.state == State.GROUNDED
+
     def orders(self, seen: Situation) -> list[str]:
         """The orders that would change something now."""
         return sensible(replace(self._look(), seen=seen))
@@ -301,6 +308,7 @@ class MissionCore:
         self._emit(Tell(f"search {self.standing.state}: this aircraft is let go for another one", 5))
         self._emit(Note(f"waiting for {said}, in the place of system {t.system_id} ({t.autopilot})"))
         self._emit(ForgetAircraft(wish.system_id))
+        self._left = Standing()
         self._begin_with_an_aircraft()
         self._phase = Grounded(None, coming=True)
 
@@ -308,7 +316,6 @@ class MissionCore:
         """The energy of a flight that has not begun."""
         return Reserve(self.chart, self.settings.flight, self.helm.heights.highest_return_m)
 
-        self._left = Standing()
     def _see(self, seen: Situation, now: float) -> None:
         self._seen, self._now = seen, now
         self.helm.reckon(seen.telemetry)
@@ -583,6 +590,7 @@ class MissionCore:
         self.chart.take(grid)
         crosses = self.helm.crosses(t)
         self.helm.regrid()
+        self.reserve.forget_way()
         if crosses and self.standing.state in MOVING and not self.standing.goes_home_by_itself:
             self._emit(
                 Note("the leg that was flown crosses ground that is excluded now: stopping first", _WARNING)
@@ -590,7 +598,6 @@ class MissionCore:
             self._stop()
         elif self.standing.autopilot_returns and not self.chart.leg_allowed(here(t), self.chart.home(t)):
             said = "the autopilot's way home may cross ground that is excluded now"
-        self.reserve.forget_way()
             self._want([Note(said, _WARNING), Tell(f"search {self.standing.state}: {said}", 4)])
 
     def _decided(self, thought: Thought) -> None:

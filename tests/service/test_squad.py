@@ -246,11 +246,11 @@ def test_one_that_does_not_search_has_given_its_share_back(state: State, given: 
 class Silent(StandIn):
     """A mission that goes on for as long as it is let, with an aircraft that is not heard any more."""
 
-    def __init__(self, name: str, search: Search, state: State) -> None:
+    def __init__(self, name: str, search: Search, state: State, *, between: bool = False) -> None:
         super().__init__(name, search, state)
         self.clock = Clock(200.0)
         self.vehicle = SimpleNamespace(telemetry=Telemetry())
-        self.core = SimpleNamespace(terms=Terms())
+        self.core = SimpleNamespace(terms=Terms(), between_sorties=between)
         self.gone = asyncio.Event()
 
     async def run(self) -> None:
@@ -265,12 +265,20 @@ class Silent(StandIn):
         self.gone.set()
 
 
-@pytest.mark.parametrize(("state", "left"), [(State.SEARCHING, True), (State.GROUNDED, False)])
+@pytest.mark.parametrize(
+    ("state", "between", "left"),
+    [
+        (State.SEARCHING, False, True),
+        (State.WAITING, False, True),
+        (State.GROUNDED, True, False),
+        (State.WAITING, True, False),  # an earlier process left it between two sorties
+    ],
+)
 def test_one_that_is_silent_when_all_others_have_ended_is_left_but_on_the_ground_it_may_be_switched_off(
-    state: State, left: bool
+    state: State, between: bool, left: bool
 ) -> None:
     search = Search(GRID, SETTINGS)
-    north, south = Silent("north", search, State.DONE), Silent("south", search, state)
+    north, south = Silent("north", search, State.DONE), Silent("south", search, state, between=between)
 
     async def run() -> None:
         looks, ticking = [0], north.clock.sleep

@@ -450,3 +450,9 @@ def test_what_a_sortie_leaves_is_planned_from_the_launch_point_before_the_next()
     over.on(Order("finish"))
     assert over.state == State.DONE
     assert PlanAnew() not in over.wanted
+
+
+def test_it_waits_between_two_sorties_after_a_restart_too() -> None:
+    assert grounded().core.between_sorties
+    assert Talk(standing=Standing(state=State.GROUNDED)).core.between_sorties
+    assert not Talk(standing=Standing(state=State.SEARCHING)).core.between_sorties

@@ -197,7 +197,8 @@ class Squad:
         """News from the field, or news taken back. Raises BadInput, JournalLost."""
         if isinstance(said, FieldNews) and said.role == "exclude":
             for each in self.missions.values():
-                each.core.chart.refuse_over_home(said.ground, each.vehicle.telemetry)
+                if each.state not in FINAL:
+                    each.core.chart.refuse_over_home(said.ground, each.vehicle.telemetry, each.name)
         first = self.leading
         await first.hear(said)
         for each in self.missions.values():

@@ -82,14 +82,17 @@ class Helm:
     def unfit(self, t: Telemetry, others: Sequence[Other]) -> str:
         """Why this aircraft is not the one to begin with, or nothing: it is too far away, must not land where it would,
         or is another mission's."""
-        return self.too_far(t) or self._no_home(t) or self.traffic.twin(t, others)
+        return self.too_far(t) or self._no_home(t, others) or self.traffic.twin(t, others)
 
-    def _no_home(self, t: Telemetry) -> str:
-        """Why it must not land where its autopilot would, or nothing."""
-        home = self._chart.home(t)
-        if not self._chart.excluded(home):
-            return ""
-        return f"home, {self._chart.written(home)}, lies in an excluded area; move one of the two"
+    def _no_home(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """Why it must not land where its autopilot would, or nothing. Among others the last leg home is ours, too."""
+        home, least = self._chart.home(t), self._chart.grid.clearance_m
+        if self._chart.excluded(home):
+            return f"home, {self._chart.written(home)}, lies in an excluded area; move one of the two"
+        if others and self._chart.too_near(home):
+            said = f"lies within {least:g} m of an excluded area"
+            return f"home, {self._chart.written(home)}, {said}; move one of the two"
+        return ""
 
     def too_far(self, t: Telemetry) -> str:
         """Why the aircraft is too far from where the search is to begin, or nothing."""

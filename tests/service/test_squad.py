@@ -299,8 +299,8 @@ def test_one_that_is_silent_when_all_others_have_ended_is_left_but_on_the_ground
 class WithAHome(StandIn):
     """One that hears news, and has a home beside the launch point."""
 
-    def __init__(self, name: str, home: Home) -> None:
-        super().__init__(name, Search(GRID, SETTINGS))
+    def __init__(self, name: str, home: Home, state: State = State.SEARCHING) -> None:
+        super().__init__(name, Search(GRID, SETTINGS), state)
         self.core = SimpleNamespace(chart=Chart(GRID))
         self.vehicle = SimpleNamespace(telemetry=Telemetry(home=home))
         self.heard: list[str] = []
@@ -312,20 +312,36 @@ class WithAHome(StandIn):
         """Nothing follows."""
 
 
-def test_an_exclusion_over_the_home_of_any_aircraft_is_refused_and_other_news_there_are_not() -> None:
+@pytest.mark.parametrize(
+    ("state", "away_m", "words"),
+    [
+        (State.SEARCHING, 0.0, "lies in it"),
+        (State.SEARCHING, 3.0, "lies 3 m from it, less than 5 m"),
+        (State.SEARCHING, 8.0, ""),
+        (State.DONE, 0.0, ""),
+    ],
+)
+def test_an_exclusion_over_or_beside_the_home_of_any_aircraft_is_refused_and_other_news_there_are_not(
+    state: State, away_m: float, words: str
+) -> None:
     homes = [place(250.0, 60.0), place(60.0, 60.0)]
     missions: Any = [
-        WithAHome(name, Home(*at, 400.0)) for name, at in zip(("north", "south"), homes, strict=True)
+        WithAHome("north", Home(*homes[0], 400.0)),
+        WithAHome("south", Home(*homes[1], 400.0), state),
     ]
     squad = Squad(missions, SETTINGS)
-    lat, lon = homes[1]
+    corners = [(60.0 + away_m, 50.0), (90.0, 50.0), (90.0, 70.0), (60.0 + away_m, 70.0)]
+    if not away_m:
+        corners[0], corners[3] = (50.0, 50.0), (50.0, 70.0)
+    around = shapely.MultiPolygon([shapely.Polygon([place(*each)[::-1] for each in corners])])
     nothing = np.zeros((0, 2), dtype=np.int64)
-    around = shapely.MultiPolygon([shapely.Point(lon, lat).buffer(1e-4)])
     for role in ("searched", "exclude"):
         news = FieldNews(role, role, "", homes[1], nothing, np.zeros(0), around)
-        if role == "exclude":
-            with pytest.raises(BadInput, match=r"the aircraft's home, .*, lies in it; move one of the two"):
+        if role == "exclude" and words:
+            with pytest.raises(
+                BadInput, match=rf"the home of aircraft south, .*, {words}; move one of the two"
+            ):
                 asyncio.run(squad.hear(news))
         else:
             asyncio.run(squad.hear(news))
-    assert missions[0].heard == ["searched"]
+    assert missions[0].heard == ["searched"] if words else ["searched", "exclude"]

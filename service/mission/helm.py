@@ -6,14 +6,15 @@ long things have been the way they are, and the height and the fence that follow
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from service.config import Settings
-from service.geometry import LatLon
+from service.geometry import LatLon, offset_m
 from service.mavlink.events import Target
 from service.mavlink.target import distance_m
 from service.mavlink.telemetry import Telemetry, Wind
-from service.mission.apart import Other
+from service.mission.apart import Other, called
 from service.mission.chart import Chart, here
 from service.mission.effects import SendWaypoint
 from service.mission.energy import take_off_objection
@@ -32,6 +33,8 @@ from service.mission.traffic import Traffic
 WINDY_S = 5.0
 FAR_M = 50.0
 STRAYED_S = 2.0
+BESIDE_M = 4.0
+"""Whose home is nearer to another's may land on who stands there already: GPS is not better."""
 LOW_S = 1.0
 
 
@@ -113,6 +116,19 @@ class Helm:
         """That home is not at the launch point, when a person should know, or nothing."""
         away = self._from_launch_m(t)
         return f"home is {_metres(away)} from the launch point" if away > FAR_M else ""
+
+    def beside(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """That it lands where another aircraft lands, and may stand, when a person should know, or nothing."""
+        for other in others:
+            if t.home is None or other.system_id is None:  # not told yet
+                continue
+            metres = math.hypot(*offset_m(self._chart.home(t), other.home))
+            if metres < BESIDE_M:
+                return (
+                    f"home is {metres:.0f} m from that of {called(other)}: "
+                    "who lands second may come down on who stands there"
+                )
+        return ""
 
     def _from_launch_m(self, t: Telemetry) -> float:
         """Metres between home and the launch point, on the ellipsoid: the plane of the grid ends near the area."""

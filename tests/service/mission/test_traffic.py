@@ -396,6 +396,26 @@ def test_who_is_not_heard_or_is_flown_by_its_pilot_is_not_steered_and_its_place_
     assert not told.steered
 
 
+@pytest.mark.parametrize(
+    ("east_m", "link", "said"), [(1.0, "udpin://:14550", 1), (6.0, "udpin://:14550", 0), (1.0, None, 0)]
+)
+def test_who_lands_where_another_one_lands_is_told_before_the_take_off(
+    east_m: float, link: str | None, said: int
+) -> None:
+    talk = named(
+        reached(State.READY, {"link": {"connect": link} if link else {}}, may_take_off=True, **ON_GROUND)
+    )
+    talk.tick()
+    lat, lon = HOME
+    parked = other(HERE, system_id=2, in_air=False, home=(lat, lon + east_m / 76_000.0))
+    talk.sees(others=(parked,))
+    talk.done()
+    talk.pass_by(2.0)
+    assert isinstance(talk.doing(), EnterGuided)
+    assert notes(talk, "may come down on who stands there") == said
+    assert ("from that of aircraft 1" in talk.core.standing.why) == bool(said)
+
+
 SPACING = Spacing.of(Talk().settings.flight, 2.0)
 LAST = place(180.0, 120.0)
 

@@ -144,7 +144,9 @@ class MissionCore:
         """The action under way."""
         self.overtaken = 0
         """How often a person has stopped the aircraft, or taken it: an order of before counts no more then."""
-        self._left = self.standing
+        self._left = self._flown_as = (
+            self.standing
+        )  # as an earlier process left it; and what is asked of it since
         self._logbook = Logbook(self.flight, self._left)
         self.standing = replace(
             self.standing, state=State.WAITING, causes=frozenset(), homeward=self._left.goes_home
@@ -251,8 +253,8 @@ class MissionCore:
 
     def told(self, seen: Situation, now: float) -> Other:
         """This aircraft as the other aircraft of the search are to see it: in the air from when it is about to be."""
-        if not math.isfinite(seen.telemetry.heartbeat_time) and may_be_aloft(self._left, self.flight):
-            climbs = self._left.state == State.TAKEOFF
+        if not math.isfinite(seen.telemetry.heartbeat_time) and may_be_aloft(self._flown_as, self.flight):
+            climbs = self._flown_as.state == State.TAKEOFF
             return self.helm.traffic.unheard(seen.telemetry, now, self.flight, climbs=climbs)
         standing, heard = self.standing, now - seen.telemetry.heartbeat_time < self.terms.heartbeat_fresh_s
         course = Course(
@@ -308,7 +310,7 @@ class MissionCore:
         self._emit(Tell(f"search {self.standing.state}: this aircraft is let go for another one", 5))
         self._emit(Note(f"waiting for {said}, in the place of system {t.system_id} ({t.autopilot})"))
         self._emit(ForgetAircraft(wish.system_id))
-        self._left = Standing()
+        self._flown_as = Standing()
         self._begin_with_an_aircraft()
         self._phase = Grounded(None, coming=True)
 
@@ -507,6 +509,8 @@ class MissionCore:
 
     def _come_up(self, wish: ComeUp) -> None:
         """What a person wants of an aircraft that is not heard yet is as good as done, whatever a flag says later."""
+        if not wish.ticket and self._left.state == State.HOLDING:
+            return  # what an operator holds stays so, whatever others find
         asked = as_asked(self._left, wish.event, wish.why)
         if asked is not None:
             self._left = asked
@@ -519,8 +523,9 @@ class MissionCore:
             self._emit(Note(said))
         elif wish.event == Event.FINISH:
             self._happen(Happen(wish.event, wish.why, stopped=wish.why, searched=True))
-        refused = "" if asked is not None or wish.event == Event.FINISH else self._left.state
-        self._emit(Answer(wish.ticket, f"there is nothing to {wish.event} in {refused}" if refused else ""))
+        in_vain = asked is None and wish.event != Event.FINISH
+        refused = f"it was left {self._left.state} and is not heard yet; order it once it is"
+        self._emit(Answer(wish.ticket, refused if in_vain else ""))
 
     def _give_up(self, reason: str, *, stop: bool, then: str) -> None:
         before = self.standing.state

@@ -80,6 +80,8 @@ def over_for_all(look: Look) -> Iterator[Wish]:
     silent = standing.state == State.HOLDING and standing.causes <= {"detector"}
     if standing.state == State.WAITING:
         yield ComeUp(Event.FINISH, why)
+    elif standing.state == State.READY and look.flight.aloft_s(look.now) > 0.0:
+        return  # an earlier process left it in the air: it comes up as that did, and is not left to hover
     elif standing.state in (State.READY, State.TAKEOFF, State.GROUNDED) or silent:
         yield Happen(Event.FINISH, why, stopped=why, searched=True)
     else:

@@ -424,6 +424,17 @@ def test_one_that_is_not_heard_when_the_search_is_over_for_all_flies_home_once_i
     assert (talk.state, talk.core.standing.settled) == (State.RETURNING, True)
 
 
+def test_one_that_was_held_and_is_not_heard_when_the_search_is_over_for_all_stays_held() -> None:
+    flight = Flight(flown=True, carried_s=60.0, left_at=990.0)
+    talk = Talk(standing=Standing(state=State.HOLDING), flight=flight, in_control=False)
+    talk.sees(over="found")
+    talk.pass_by(2.0)
+    assert not [row for row in talk.rows if isinstance(row, TransitionRow)]
+    talk.done()
+    talk.pass_by(2.0)
+    assert (talk.state, talk.core.standing.settled) == (State.HOLDING, True)
+
+
 # ---- where it is
 
 

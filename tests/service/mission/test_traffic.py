@@ -444,6 +444,16 @@ def test_one_that_was_left_in_the_air_and_is_not_heard_yet_may_be_on_its_way_hom
     assert not objection(below, through_its_way_home, (later,), SPACING)
 
 
+def test_what_is_ordered_before_it_is_heard_does_not_take_it_from_the_air() -> None:
+    talk = left_behind(
+        State.TAKEOFF, earlier_s=90.0
+    )  # of a first flight; nothing is journalled of this one yet
+    talk.on(Order("hold"))
+    told = talk.core.told(talk.seen, talk.now)
+    assert told.in_air
+    assert 15.0 in told.goals_up_m
+
+
 def test_until_it_is_heard_it_may_fly_to_where_it_was_sent_last() -> None:
     talk = left_behind(State.SEARCHING)
     assert talk.core.told(talk.seen, talk.now).goals == (FAR,)

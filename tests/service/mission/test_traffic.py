@@ -218,6 +218,30 @@ def test_among_others_the_way_home_is_flown_in_the_own_layer_and_the_landing_wai
     assert talk.core.told(talk.seen, talk.now).returns
 
 
+def test_who_lands_already_makes_no_room_for_one_that_waits_to_land_after_it() -> None:
+    """What it would be sent to its autopilot does not fly to any more, and down there it would never be over."""
+    talk = named(searching())
+    talk.sees(others=(other(FAR),))
+    talk.on(Order("return"))
+    talk.tick()
+    while isinstance(talk.core.doing, SendWaypoint):
+        point = talk.core.doing.point
+        assert sent(talk)
+        talk.flew(point)
+        talk.tick()
+    assert isinstance(talk.doing(), ReturnToLaunch)
+    talk.done()
+    talk.shows(guided=False, mode="RTL")
+    waits = Claim(Room((HOME,), -math.inf, 60.0), True, "land")
+    talk.sees(others=(other(place(60.0, 20.0), up=60.0, claim=waits),))
+    talk.wanted.clear()
+    talk.pass_by(20.0)
+    assert not any(isinstance(effect, SendWaypoint) for effect in talk.wanted)
+    talk.shows(**ON_GROUND)
+    talk.tick()
+    assert talk.state == State.DONE
+
+
 def test_the_wait_for_those_who_land_before_is_in_the_battery() -> None:
     """Two others over the same launch point, 30 and 40 m up: each takes its descent and a while to stand still."""
 

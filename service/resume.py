@@ -22,7 +22,7 @@ from service.known import Judgement, Withdrawn
 from service.mission.entering import still_enough
 from service.mission.flight import Flight
 from service.mission.orders import ASKED, FINISHED
-from service.mission.standing import Standing
+from service.mission.standing import Standing, as_asked
 from service.mission.states import FINAL, FLYING, MAY_MOVE, SEARCHED_TO, SETTLED, Event, State
 from service.rows import (
     CommandRow,
@@ -221,6 +221,9 @@ def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standi
             continue
         settled = standing.settled or row.event in SETTLED
         enough = still_enough(standing, row.event, row.after)
+        if row.after == row.before == State.WAITING:  # what was wanted before the aircraft was heard
+            standing = as_asked(standing, row.event, row.reason) or standing
+            continue
         if row.after == row.before:  # nothing but that it is settled, or not any more
             settled = settled and row.event != Event.RESUME
             enough = settled and row.reason.startswith(SEARCHED_TO)
@@ -268,6 +271,8 @@ def left_flight(journal: Path, search: Search, whose: Whose = ALONE) -> Flight:
             case FlightRow() as row:
                 flight.recall(row, entry.time)
                 flight.by = vehicle
+            case CommandRow(command="reposition", lat=float(lat), lon=float(lon)):
+                flight.goal = lat, lon
             case TransitionRow(after=state):
                 flight.flown |= state in MAY_MOVE
             case VehicleRow(system_id=system_id, autopilot=autopilot):

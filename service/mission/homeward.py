@@ -56,10 +56,11 @@ class Homeward(Phase):
                 if not look.seen.others and look.helm.returns_clear([(t.lat, t.lon), *points][-2], t):
                     points = points[:-1]  # from there the autopilot flies
                 self._way = Way(points, climb=bool(points))
-        if self._way is not None and (place := self._aside.place(look)) is not None:
+        ours = self._way is not None and not self._resting  # who lands already makes room by being down
+        if ours and (place := self._aside.place(look)) is not None:
             yield Note(f"makes room for the others at {look.chart.written(place)}")
             self._way = Way([place, *look.chart.route(place, look.chart.home(t))], climb=False)
-        if self._way is not None:
+        if self._way is not None and not self._resting:
             yield from self._way.tick(look)
             if not self._way.flown:
                 return

@@ -128,6 +128,16 @@ class Stay:
 
 
 @dataclass(frozen=True, slots=True)
+class ComeUp:
+    """What is ordered (`event`) of an aircraft that is not heard yet: it comes up so once it is. Answered by `ticket`;
+    0: nobody asked."""
+
+    event: Event
+    why: str
+    ticket: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Overtaken:
     """A person has stopped the aircraft or taken it: what was ordered before, and is not carried out yet, is void."""
 
@@ -161,6 +171,7 @@ Wish = (
     | Settle
     | Unsettle
     | Stay
+    | ComeUp
     | Overtaken
     | Pending
 )

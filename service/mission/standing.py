@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from service.config import Settings
 from service.evidence.found import Found
@@ -11,7 +11,7 @@ from service.mission.energy import Energy, Left
 from service.mission.flight import Flight
 from service.mission.helm import Helm
 from service.mission.situation import Situation
-from service.mission.states import FLYING, State
+from service.mission.states import FLYING, Event, State
 
 LEAST_PATIENCE_WALL_S = 1.5
 
@@ -64,6 +64,38 @@ class Standing:
     def flying(self) -> bool:
         """It searches."""
         return self.state in FLYING
+
+
+_ALOFT = (State.TAKEOFF, *FLYING, State.FOUND, State.HOLDING, State.RETURNING)
+
+
+def as_asked(left: Standing, event: Event, why: str) -> Standing | None:
+    """How a run that was left so comes up where a hold, a return or the finish is wanted before its aircraft is heard.
+
+    None where that changes nothing: what its pilot has and what waits between two sorties moves by a fresh order only,
+    and what has not flown is over when it is finished. Before the first flight a return is a hold on the ground.
+    """
+    if left.state in (State.YIELDED, State.GROUNDED):
+        return None
+    if left.state not in _ALOFT:
+        return None if event == Event.FINISH else replace(left, state=State.HOLDING, why=why)
+    if event == Event.HOLD:
+        return replace(left, state=State.HOLDING, why=why)
+    over = event == Event.FINISH
+    return replace(
+        left,
+        state=State.RETURNING,
+        why=why,
+        why_stopped=why if over else left.why_stopped or why,
+        searched=left.searched or over,
+        settled=left.settled or over,
+    )
+
+
+def may_be_aloft(left: Standing, flight: Flight) -> bool:
+    """Whether an aircraft may be in the air of which is known only how an earlier process left its run."""
+    flew = left.state in (*_ALOFT, State.YIELDED) and flight.aloft_s(flight.left_at) > 0.0
+    return flew or left.state == State.TAKEOFF
 
 
 @dataclass(frozen=True, slots=True)

@@ -235,7 +235,7 @@ class RunView(BaseView):
             "flight_time_s": flown,
             "sorties": sortie_states(mission.flight.sorties, mission.name or ONLY) if mission else [],
             "news": news_states(self.search.known.news),
-            "flight_left_s": self._flight_left(flown),
+            "flight_left_s": self._flight_left(),
             "battery_percent": telemetry.battery_percent if telemetry else None,
             "battery_doubt": (mission.core.battery_doubt if mission else "") or None,
             "mode": mode_title(telemetry.mode) if telemetry else None,
@@ -337,10 +337,9 @@ class RunView(BaseView):
         age = max(0.0, self.clock.now() - intake.last_at)
         return {"silent_s": age, "silent": age > mission.core.settings.sensor.silent_after_s}
 
-    def _flight_left(self, flown: float) -> float | None:
+    def _flight_left(self) -> float | None:
         """Seconds until the way home must begin, for the battery or the time; None while unknown."""
-        left = self.mission.energy.seconds_left(self.settings.flight) if self.mission else None
-        return None if left is None else min(left, max(0.0, self.settings.flight.max_flight_s - flown))
+        return flight_left_s(self.mission, self.clock.now()) if self.mission else None
 
     def moment(self) -> Moment:
         """What there is to see now, for the page."""
@@ -366,6 +365,14 @@ class RunView(BaseView):
 def known_or_nan(value: float | None) -> float:
     """A number that may be unknown, as a metric has it."""
     return math.nan if value is None else value
+
+
+def flight_left_s(mission: Mission, now: float) -> float | None:
+    """Seconds until an aircraft must begin its way home, for its battery or the time of this sortie; None while
+    unknown."""
+    flight = mission.core.settings.flight
+    left = mission.energy.seconds_left(flight)
+    return None if left is None else min(left, max(0.0, flight.max_flight_s - mission.flight.aloft_s(now)))
 
 
 def pose_of(mission: Mission | None) -> FramePose | None:

@@ -108,6 +108,11 @@ def test_a_run_that_is_over_is_not_gone_on_with(tmp_path: Path) -> None:
         ([*UP, ("SEARCHING", "abort", "ABORTED")], State.SEARCHING),
         (FOUND, State.RETURNING),
         ([*LOW, LANDED], State.WAITING),
+        ([("WAITING", "hold", "WAITING")], State.HOLDING),  # ordered before it was heard
+        ([("WAITING", "hold", "WAITING"), ("WAITING", "linked", "READY")], State.HOLDING),
+        ([*UP, ("WAITING", "return", "WAITING")], State.RETURNING),
+        ([*UP, ("WAITING", "finish", "WAITING")], State.RETURNING),
+        ([*TAKEN, ("WAITING", "hold", "WAITING")], State.YIELDED),
     ],
 )
 def test_a_run_is_taken_up_as_it_was_left(steps: Sequence[Step], state: State, tmp_path: Path) -> None:
@@ -171,6 +176,7 @@ def test_what_was_flown_goes_on_across_processes(tmp_path: Path) -> None:
     assert (flight.seconds(5000.0), flight.steps, flight.decisions, flight.waypoints) == (45.0, 5, 1, 1)
     assert len(flight.track) == 3
     assert flight.flown
+    assert flight.goal == (47.0, 8.3)
 
 
 def test_who_flew_what_and_how_far_the_rows_tell_is_taken_up(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import shapely
 
 from service.area import Grid, build_grid, parse_area
 from service.errors import BadInput
+from service.mavlink.events import Home
 from service.mission.effects import DropThought, SendWaypoint, Stop, Tell, Think
 from service.mission.news import MapChanged, Order
 from service.mission.states import Event, State
@@ -119,6 +120,22 @@ def test_the_pilot_is_told_when_the_autopilots_own_way_home_may_cross_it() -> No
         "search RETURNING: the autopilot's way home may cross ground that is excluded now"
     ]
     assert Stop() not in talk.wanted
+
+
+def test_the_energy_for_the_way_home_is_that_of_the_way_around_it_while_the_aircraft_hovers() -> None:
+    talk = reached(State.SEARCHING)
+    talk.pass_by(1.0)
+    talk.flew(place(200.0, 95.0))
+    talk.tick()
+    straight_s = talk.core.reserve.energy.home.seconds
+    talk.on(MapChanged(GRID.excluding(box(105.0, 5.0, 125.0, 130.0))))
+    talk.tick()
+    around_s = talk.core.reserve.energy.home.seconds
+    assert around_s > straight_s + 5.0
+    lat, lon = place(200.0, 90.0)
+    talk.shows(home=Home(lat, lon, 400.0))
+    talk.tick()
+    assert talk.core.reserve.energy.home.seconds < straight_s
 
 
 def test_taken_back_it_may_be_flown_over_again() -> None:

@@ -182,6 +182,9 @@ def _observe(belief: Belief, seen: dict[str, Any]) -> None:
 
 
 def _adds_up(folder: Path, rows: list[Row], told: Iterable[Told]) -> list[str]:
+    """Reports alone make the belief, in flights without a clue: what is believed anew for one is not judged here."""
+    if any(row.kind == "news" and row.body["role"] == "clue" for row in rows):
+        return []
     grid = build_grid(read_area(folder / "area.geojson"), ground.CELL_M)
     belief = Belief(grid.prior, searchable=grid.searchable, outside=grid.outside)
     digests = [belief.digest()]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import signal
 import sqlite3
 import subprocess
@@ -257,6 +258,8 @@ class SoakFlight:
             setattr(eyes, switch, True)
             self._pass(fault.seconds)
             setattr(eyes, switch, False)
+        elif kind in ("clue", "exclude"):
+            self._tell_news(kind, fault)
         elif kind == "journal_locked":
             self._lock_the_journal(fault.seconds)
         elif kind == "operator_holds":
@@ -265,6 +268,18 @@ class SoakFlight:
             self._pass(fault.seconds)
         else:
             self._let_the_mock(fault)
+
+    def _tell_news(self, role: str, fault: Fault) -> None:
+        """Somebody tells of the marsh, that there is a clue or that it is not to be flown over, and takes it back."""
+        shape = {"type": "Polygon", "coordinates": [ground.ring(ground.MARSH)]}
+        properties = {"role": role, **fault.options}
+        told = self._post("/api/news", {"type": "Feature", "properties": properties, "geometry": shape})
+        if role == "exclude":
+            self.judge.excluded(time.monotonic())
+        self._pass(fault.seconds)
+        self.judge.excluded(math.inf)
+        if told is not None:
+            self._post(f"/api/news/{told['id']}/withdraw", {})
 
     def _lock_the_journal(self, seconds: float) -> None:
         """Another program writes to the journal, and is in no hurry."""
@@ -369,13 +384,19 @@ class SoakFlight:
 
     def _order(self, command: str) -> None:
         self.judge.ordered(time.monotonic())
-        try:
-            httpx.post(f"{self._url}/api/commands", json={"command": command}, timeout=40.0)
-        except httpx.HTTPError as error:
-            self._wait_for_the_end(30.0)  # an order that comes when the run ends finds the door shut
-            if self._service.process.poll() is None:
-                raise Trouble(f"the order '{command}' was not taken: {error}") from error
+        self._post("/api/commands", {"command": command}, refused=True)
         self.judge.ordered(time.monotonic())
+
+    def _post(self, path: str, body: dict[str, Any], *, refused: bool = False) -> Any:
+        """What the door answers; None when the run has ended. `refused`: it may refuse, which is an answer, too."""
+        try:
+            answer = httpx.post(self._url + path, json=body, timeout=40.0)
+            return (answer if refused else answer.raise_for_status()).json()
+        except httpx.HTTPError as error:
+            self._wait_for_the_end(30.0)  # what comes when the run ends finds the door shut
+            if self._service.process.poll() is None:
+                raise Trouble(f"{path} did not take {body}: {error}") from error
+            return None
 
     def _wait_for_the_end(self, patience_s: float) -> None:
         with contextlib.suppress(subprocess.TimeoutExpired):

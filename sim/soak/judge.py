@@ -76,6 +76,7 @@ class Judge:
         self._too_close = False
         self._braked = False  # and not flown on since
         self._crashed = False
+        self._marsh_since = math.inf
         self.steady = False  # nothing goes on that may lower the aircraft
         self.during = ""  # the fault that came last
 
@@ -113,6 +114,11 @@ class Judge:
             if too_close and not self._too_close:
                 self._see(f"closer than allowed in {self.state}: {too_close}")
             self._too_close = bool(too_close)
+
+    def excluded(self, since: float) -> None:
+        """The marsh is excluded since then (monotonic); infinite: not any more."""
+        with self._lock:
+            self._marsh_since = since
 
     def started_over(self) -> None:
         """The service is another process now."""
@@ -235,7 +241,10 @@ class Judge:
                 found.append("a stop far away")
         else:
             searching = self.state in ("SEARCHING", "CONFIRMING")
-            objections = [ground.why_not(here, there, searching=searching) for here in self._positions]
+            marsh = now - self._marsh_since > self._late_s
+            objections = [
+                ground.why_not(here, there, searching=searching, marsh=marsh) for here in self._positions
+            ]
             if objections and all(objections):
                 found.append(objections[-1])
             below = [*self._grounds, *self._homes] or [

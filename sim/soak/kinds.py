@@ -157,6 +157,9 @@ KINDS: dict[str, Kind] = {
     "bad_requests": Kind(1, (2, 10)),
     # the operator
     "operator_holds": Kind(1, (2, 20)),
+    # news from the field
+    "clue": Kind(1, (5, 20), lambda rng: {"bayes_factor": float(rng.choice([0.1, 20.0]))}),
+    "exclude": Kind(1, (20, 60)),
     # our own process
     "stall": Kind(2, (0, 0), lambda rng: {"wall_s": float(rng.uniform(0.3, 5.0))}),
     "killed": Kind(2, (0, 0)),

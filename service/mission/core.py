@@ -49,7 +49,7 @@ from service.mission.flight import Flight
 from service.mission.grounded import Grounded
 from service.mission.guard import CRITICAL, guard
 from service.mission.helm import Helm
-from service.mission.limits import Objection
+from service.mission.limits import Objection, not_airborne
 from service.mission.logbook import Logbook
 from service.mission.news import (
     Done,
@@ -502,13 +502,14 @@ class MissionCore:
     # ---- stopping
 
     def _stop(self) -> bool:
-        """Stop here. A stop is a waypoint too: while the position is not trusted, the autopilot brakes by itself."""
+        """Stop here. A stop is a waypoint too: while none can be sent, the autopilot brakes by itself."""
         self._drop_action()
         self._emit(Rest())
         if not self._seen.telemetry.in_control:
             return False
-        doubts = self.helm.doubts(self._seen.telemetry, self._now)
-        self._emit(Brake() if doubts else Stop(self.helm.heights.least_stop_amsl_m(self._seen.telemetry)))
+        t = self._seen.telemetry
+        blind = self.helm.doubts(t, self._now) or not_airborne(t)  # no waypoint would be sent
+        self._emit(Brake() if blind else Stop(self.helm.heights.least_stop_amsl_m(self._seen.telemetry)))
         return True
 
     def _drop_action(self) -> None:

@@ -24,6 +24,7 @@ from service.mission.limits import (
     Objection,
     PositionTrust,
     Progress,
+    not_airborne,
     reference_objection,
     wind_objection,
 )
@@ -33,6 +34,7 @@ WINDY_S = 5.0
 FAR_M = 50.0
 STRAYED_S = 2.0
 LOW_S = 1.0
+AIRBORNE_S = 2.0  # so long it may not say that it is in the air
 
 
 class Helm:
@@ -51,7 +53,7 @@ class Helm:
         self.trust = PositionTrust(settings.flight, fresh_s)
         near_m = max(settings.flight.corner_m, 0.3 * chart.frame.cell_m)
         self._progress = Progress(patience_s, near_m)
-        self._windy = Lasting(WINDY_S)
+        self._windy, self._aground = Lasting(WINDY_S), Lasting(max(AIRBORNE_S, fresh_s))
         self._strayed, self._straying = Lasting(STRAYED_S), Straying()
         self._low, self._sinking = Lasting(LOW_S), Straying()
         self.heights = Heights(chart, settings)
@@ -200,11 +202,13 @@ class Helm:
 
     def trouble(self, t: Telemetry, now: float, *, moving: bool) -> Objection | None:
         """What stands against flying on while the autopilot follows our waypoints, or nothing."""
-        doubts = self.doubts(t, now)
+        doubts, aground = self.doubts(t, now), self._aground.after(not_airborne(t) if moving else "", now)
         if not t.guided:
             return None
         if doubts:
             return Objection("position", "; ".join(doubts))
+        if aground:
+            return Objection("air", aground)
         if moving and self._target is not None:
             stuck = self._progress.stuck(self._chart.distance(here(t), self._target), now)
             return Objection("progress", stuck) if stuck else None

@@ -70,7 +70,7 @@ from service.mission.news import (
 )
 from service.mission.orders import STOPPING
 from service.mission.outlook import Outlook, pose_at
-from service.mission.situation import Situation
+from service.mission.situation import Situation, on_ground
 from service.mission.standing import Standing
 from service.mission.states import FINAL, State
 from service.mission.tickets import Tickets
@@ -283,7 +283,7 @@ class Mission:
         not left hovering, its autopilot brings it home."""
         seen = self._outlook.situation()
         self._carry_out(self.core.leave(reason, seen, self.clock.now(), stop=stop, home=home))
-        if home and seen.telemetry.in_control and seen.telemetry.landed_state != "on_ground":
+        if home and seen.telemetry.in_control and not on_ground(seen.telemetry):
             try:
                 await self.vehicle.return_to_launch()
                 self._stopped = False

@@ -431,7 +431,7 @@ class MissionCore:
             self._emit(Note(f"waypoint not sent: {objection.reason}", _WARNING))
         self._kept_from = objection.reason if objection.cause == "apart" else ""
         if self._phase is phase:
-            phase.lost(self._look())
+            phase.refused(objection, self._look())
 
     def _change(self, **fields: object) -> None:
         self.standing = replace(self.standing, **fields)  # type: ignore[arg-type]

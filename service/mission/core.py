@@ -49,7 +49,7 @@ from service.mission.flight import Flight
 from service.mission.grounded import Grounded
 from service.mission.guard import CRITICAL, guard
 from service.mission.helm import Helm
-from service.mission.limits import Objection, not_airborne
+from service.mission.limits import Objection, no_stop
 from service.mission.logbook import Logbook
 from service.mission.news import (
     Done,
@@ -508,7 +508,7 @@ class MissionCore:
         if not self._seen.telemetry.in_control:
             return False
         t = self._seen.telemetry
-        blind = self.helm.doubts(t, self._now) or not_airborne(t)  # no waypoint would be sent
+        blind = self.helm.doubts(t, self._now) or no_stop(t)
         self._emit(Brake() if blind else Stop(self.helm.heights.least_stop_amsl_m(self._seen.telemetry)))
         return True
 

@@ -91,6 +91,12 @@ def not_airborne(t: Telemetry) -> str:
     return f"the autopilot {says} the aircraft is in the air"
 
 
+def no_stop(t: Telemetry) -> bool:
+    """No waypoint can stop it: it may not be in the air by its own word, or where it is is not known."""
+    placed = t.position_known and math.isfinite(t.lat + t.lon + t.alt_amsl_m)
+    return bool(not_airborne(t)) or not placed
+
+
 def hold_objection(held_s: float, flight: FlightSettings) -> str:
     """Why hovering for a fault has to end after so many seconds, or nothing."""
     return f"hovered for {held_s:.0f} s" if held_s > flight.max_hold_s else ""

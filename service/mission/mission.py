@@ -379,8 +379,8 @@ class Mission:
 
     async def _think(self, wanted: Think) -> None:
         unseen = [cell for cell in wanted.ahead if cell not in self.intake.passes]
-        state = SearchState(wanted.cell, wanted.heading, wanted.speed_mps)
         try:
+            state = SearchState(wanted.cell, wanted.heading, wanted.speed_mps)
             decision = await self.search.decide(state, unseen, wanted.left, self.clock.now())
         except Exception as error:  # whatever a planner from outside does: the aircraft is not left alone
             log.exception("the planner has failed")

@@ -90,7 +90,7 @@ class VehicleWatch:
         yield Lost()
 
     def _link_lost(self, event: LinkLost, look: Look) -> Iterator[Wish]:
-        yield Hold("link", SILENT)
+        yield _hold("link", SILENT, look)
 
     def _taken_up(self, event: TargetTaken, look: Look) -> Iterator[Wish]:
         self._refused = 0
@@ -114,9 +114,8 @@ class VehicleWatch:
         yield Note(said, 30)
         yield Tell(f"search: {said}", 4)
         if event.position_too and look.standing.state in (*MOVING, State.HOLDING):
-            yield Hold(
-                "operator", "the position has moved with the estimator's origin: is it where the map says?"
-            )
+            moved = "the position has moved with the estimator's origin: is it where the map says?"
+            yield _hold("operator", moved, look)
 
     def _not_taken(self, event: TargetNotTaken, look: Look) -> Iterator[Wish]:
         """The autopilot does not fly to the waypoint: hold, for what that is most likely due to.
@@ -132,13 +131,13 @@ class VehicleWatch:
             if self._refused < REFUSALS:
                 yield Lost()
         elif not look.heard():
-            yield Hold("link", SILENT)
+            yield _hold("link", SILENT, look)
         elif doubts := look.helm.doubts(look.seen.telemetry, look.now):
-            yield Hold("position", "; ".join(doubts))
+            yield _hold("position", "; ".join(doubts), look)
         elif self._refused < REFUSALS:
             yield Lost()
         else:
-            yield Hold("target", f"the waypoint is not flown: {event.reason}")
+            yield _hold("target", f"the waypoint is not flown: {event.reason}", look)
 
     def tick(self, look: Look) -> Iterator[Wish]:
         """What only time shows."""
@@ -159,6 +158,15 @@ class VehicleWatch:
             why = f"landed before the search was over: {standing.why}"
             said = self._takeovers.said(standing.since)  # often told only after the mode has changed
             yield touchdown(look, "on the ground, disarmed", stopped=why + (said if said not in why else ""))
+
+
+def _hold(cause: str, why: str, look: Look) -> Hold | Note:
+    """Hover for a cause, unless the autopilot flies home by our order: nothing breaks that off."""
+    return (
+        Note(f"flying home all the same: {why}", 30)
+        if look.standing.goes_home_by_itself
+        else Hold(cause, why)
+    )
 
 
 def _lands(standing: Standing) -> bool:

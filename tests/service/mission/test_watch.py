@@ -26,9 +26,18 @@ from service.mavlink.events import (
     VehicleEvent,
 )
 from service.mavlink.modes import ModeKind
-from service.mission.effects import LetGo, SendWaypoint, Stop, Tell, WriteRow
+from service.mission.effects import (
+    Brake,
+    EnterGuided,
+    LetGo,
+    ReturnToLaunch,
+    SendWaypoint,
+    Stop,
+    Tell,
+    WriteRow,
+)
 from service.mission.states import MAY_MOVE, State
-from service.mission.watch import LISTENERS
+from service.mission.watch import LISTENERS, REFUSALS
 from service.rows import ModeRow, VehicleClockRow, YieldedRow
 from tests.service.mission.flown import GRID, ON_GROUND, Talk, reached, searching
 
@@ -217,3 +226,30 @@ def test_the_vehicles_clock_is_journalled_when_it_is_known_and_when_it_steps() -
     assert pass_by(20.0, 900.0) == []
     (stepped,) = pass_by(20.0, 940.0)  # it has booted again
     assert (stepped.service - stepped.boot_s, stepped.step_s) == (940.0, 40.0)
+
+
+@pytest.mark.parametrize("flies", [True, False])
+@pytest.mark.parametrize("event", ["silence", "moved", "not taken"])
+def test_a_return_that_the_autopilot_flies_by_our_order_is_not_broken_off(event: str, flies: bool) -> None:
+    """It needs neither us nor our waypoints, and a link that comes back does not want it stopped either."""
+    talk = reached(State.RETURNING)
+    talk.tick()
+    assert talk.doing() == ReturnToLaunch()
+    if flies:
+        talk.done()
+        talk.shows(guided=False, mode="RTL")
+    talk.wanted.clear()
+    if event == "silence":
+        talk.silent.add("heartbeat")
+        talk.tick(4.0)
+        talk.on(LinkLost(talk.now, 4.0))
+        talk.silent.clear()
+    elif event == "moved":
+        moved = Home(47.0, 8.301, 400.0)
+        talk.on(ReferenceMoved(talk.now, "origin", Home(47.0, 8.3, 400.0), moved, position_too=True))
+    else:
+        for _ in range(REFUSALS):
+            talk.on(TargetNotTaken(talk.now, Target(47.0, 8.3, 415.0), 5, "no"))
+    talk.pass_by(3.0)
+    assert talk.state == State.RETURNING
+    assert not [each for each in talk.wanted if isinstance(each, Stop | Brake | EnterGuided)]

@@ -231,9 +231,8 @@ class Mission:
         was refused if it was."""
         if why := self._no_place(command, place):
             return OrderReceipt(state=self.state, refused=why)
-        row = OrderRow(command, self.state, place)
+        row, before = OrderRow(command, self.state, place), self.core.overtaken
         if command not in STOPPING:
-            before = self.core.overtaken
             await self._rows.on_disk(row)
             if command in MOVING_ORDERS and self.core.overtaken != before:  # the later word counts
                 return OrderReceipt(state=self.state, refused=_OVERTAKEN)
@@ -241,7 +240,7 @@ class Mission:
             confirmed = command == "confirm"
             present = (self.found.lat, self.found.lon) if self.found else None
             await self.intake.judge(self.search.cell_at(place or present), confirmed=confirmed)
-            return await self.judged(confirmed=confirmed)
+            return await self.judged(confirmed=confirmed, moves=self.core.overtaken == before)
         ticket, done = self._tickets.draw()
         self._feed(Order(command, ticket, system_id))
         if command in STOPPING:
@@ -256,10 +255,11 @@ class Mission:
         there = self.found is not None or self.search.was_hit(self.search.place)
         return "" if there or command not in JUDGING else f"nothing was seen yet: name the place to {command}"
 
-    async def judged(self, *, confirmed: bool) -> OrderReceipt:
-        """An operator has confirmed or rejected a place, and the belief knows it; what comes of that."""
+    async def judged(self, *, confirmed: bool, moves: bool = True) -> OrderReceipt:
+        """An operator has confirmed or rejected a place, and the belief knows it; what comes of it. `moves`: nobody has
+        stopped the aircraft or taken it since."""
         ticket, done = self._tickets.draw()
-        self._feed(Judged(confirmed, self.search.found(), ticket))
+        self._feed(Judged(confirmed, self.search.found(), ticket, moves))
         refused = await done
         return OrderReceipt(state=self.state, refused=refused or None)
 

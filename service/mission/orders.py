@@ -115,6 +115,12 @@ def judged(word: Judged, look: Look) -> Iterator[Wish]:
     """What follows from an operator's word on a place, which the belief knows by now."""
     standing = look.standing
     said = f"the operator {'confirmed' if word.confirmed else 'rejected'} the place"
+    if not word.moves:  # it counts where the search goes on, or ends
+        if not word.confirmed and word.found is None:
+            yield Find(None)
+        yield from warn(f"{said}; the aircraft stays stopped, as was said since", look)
+        yield Answer(word.ticket)
+        return
     if word.confirmed and word.found is not None:
         yield Find(word.found)
         yield from tell(word.found, look, said)

@@ -44,7 +44,8 @@ _COMPLAINT_S = 0.3
 _ARM_AGAIN_S = 2.0
 _LATELY_S = 10.0
 _CLIMB_START_S = 20.0
-_CLIMB_MPS = 0.7
+_CLIMB_MPS = 0.7  # at least, unless its parameters say that it climbs more slowly
+_CLIMB_SHARE = 0.7  # of what they say, on the whole way up
 _SEVERITY_INFO = 6
 _SEVERITY_WARNING = 4
 
@@ -290,7 +291,7 @@ class Vehicle:
             up = t.landed_state == "in_air" and t.alt_home_m >= height_m - max(0.1 * height_m, 1.0)
             return "up" if up and t.guided else None
 
-        result = await self._shell.until(ended, self._shell.patience(_CLIMB_START_S + height_m / _CLIMB_MPS))
+        result = await self._shell.until(ended, self._shell.patience(climb_s(height_m, t.most_climb_mps)))
         if result != "up":
             t = self.telemetry
             why = (
@@ -426,3 +427,9 @@ class Vehicle:
         """What the vehicle has said about it, if anything."""
         texts = [t.text for t in self._core.recent_texts(since) if t.severity <= _SEVERITY_WARNING]
         return f" (it says: {texts[-1]})" if texts else ""
+
+
+def climb_s(height_m: float, most_climb_mps: float | None) -> float:
+    """How long a take-off to a height may last, of an aircraft that climbs so fast at most (None: not told)."""
+    told = math.inf if most_climb_mps is None else _CLIMB_SHARE * most_climb_mps
+    return _CLIMB_START_S + height_m / min(_CLIMB_MPS, told)

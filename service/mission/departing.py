@@ -40,6 +40,7 @@ from service.mission.standing import Look, Standing
 from service.mission.states import Event, State
 from service.rows import CommandRow
 
+ALOFT_M = 5.0  # so high above home nothing that is armed is on the ground, whatever it says
 AS_LEFT = "as it was before the restart"
 
 
@@ -270,8 +271,12 @@ class TakingOff(Phase):
                 yield Happen(Event.AIRBORNE, f"at {self._height_m:.0f} m")
 
     def _in_vain(self, why: str, look: Look) -> GiveUp | Happen:
-        """The aircraft does not take off. Between two sorties the search waits on for somebody to see to it."""
-        down = look.seen.telemetry.landed_state == "on_ground"
+        """The aircraft does not take off: what is in the air already flies home. Between two sorties the search waits
+        on for somebody to see to it."""
+        t = look.seen.telemetry
+        down = t.landed_state == "on_ground"
+        if t.armed and t.in_control and not (down and t.alt_home_m < ALOFT_M):
+            return Happen(Event.RETURN, why, stopped=why)
         if down and look.flight.sorties and look.settings.run.next_sortie_within_s > 0.0:
             return Happen(Event.DOWN, f"it did not take off: {why}")
         return GiveUp(why)

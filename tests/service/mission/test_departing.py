@@ -9,6 +9,7 @@ import pytest
 
 from service.mavlink.events import ArmedChanged
 from service.mavlink.telemetry import Home
+from service.mavlink.vehicle import climb_s
 from service.mission.departing import AS_LEFT
 from service.mission.effects import (
     Answer,
@@ -415,3 +416,29 @@ def test_the_pilot_is_told_what_to_do_in_ready() -> None:
     talk.tick()
     talk.tick()
     assert Tell("search READY: select Hold") in talk.wanted
+
+
+@pytest.mark.parametrize("landed", ["takeoff", "in_air", "on_ground", "undefined"])
+def test_a_take_off_that_fails_in_the_air_flies_home(landed: str) -> None:
+    talk = prepared(4)
+    talk.shows(armed=True, guided=True)
+    talk.shows(landed_state=landed, alt_home_m=9.0, alt_amsl_m=409.0)
+    assert isinstance(talk.doing(), TakeOff)
+    talk.failed("the take-off to 15 m did not end: it is at 9.0 m")
+    talk.pass_by(3.0)
+    assert (talk.state, talk.doing()) == (State.RETURNING, ReturnToLaunch())
+    assert "did not end" in talk.core.standing.why_stopped
+
+
+def test_a_take_off_that_fails_on_the_ground_stays_there() -> None:
+    talk = prepared(4)
+    talk.shows(armed=True)
+    talk.failed("the vehicle did not take off: it answered DENIED")
+    talk.pass_by(3.0)
+    assert talk.state == State.ABORTED
+    assert ReturnToLaunch() not in talk.wanted
+
+
+def test_a_slow_climb_is_given_its_time() -> None:
+    assert climb_s(70.0, None) == climb_s(70.0, 2.5) == 120.0
+    assert climb_s(100.0, 0.5) > 100.0 / 0.5

@@ -35,6 +35,7 @@ STOPPING = ("hold", "return", "home", "finish", "abort", "leave")
 OFFERED = ("hold", "resume", "return", "launch", "replace", "finish")
 """Orders that a page has a button for."""
 _MAY_LAUNCH = (State.READY, State.GROUNDED, State.YIELDED, State.HOLDING)
+_TAKES = ("resume", "return", "launch")  # what takes a yielded aircraft; finish and abort send it nothing
 STICKS = 0.15  # part of their way, from which on deflected sticks are a hand on them
 
 
@@ -141,8 +142,9 @@ def _refusal(command: str, look: Look) -> str:
     t = look.seen.telemetry
     if why := _senseless(command, look.standing.state, on_ground(t)):
         return why
-    taken = look.standing.state in (State.YIELDED, State.HOLDING)
-    if command == "resume" and taken and (t.sticks or 0.0) > STICKS:
+    yielded = look.standing.state == State.YIELDED
+    takes = command in _TAKES if yielded else command == "resume" and look.standing.state == State.HOLDING
+    if takes and (t.sticks or 0.0) > STICKS:
         return "the pilot's sticks are not in the middle; the pilot has the aircraft"
     if command == "launch":
         if not look.terms.may_take_off:

@@ -484,7 +484,7 @@ class MissionCore:
         if wish.home:
             self._happen(Happen(Event.RETURN, wish.reason, stopped="the autopilot was silent"))
         else:
-            self._happen(Happen(Event.RETURN if self.standing.homeward else Event.RESUME, wish.reason))
+            self._happen(Happen(self.standing.goes_on_by, wish.reason))
 
     def _give_up(self, reason: str, *, stop: bool, then: str) -> None:
         before = self.standing.state

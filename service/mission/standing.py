@@ -11,7 +11,7 @@ from service.mission.energy import Energy, Left
 from service.mission.flight import Flight
 from service.mission.helm import Helm
 from service.mission.situation import Situation
-from service.mission.states import FLYING, State
+from service.mission.states import FLYING, Event, State
 
 LEAST_PATIENCE_WALL_S = 1.5
 
@@ -57,6 +57,14 @@ class Standing:
     def goes_home_by_itself(self) -> bool:
         """The autopilot has been told to, or is about to be: which needs neither our waypoints nor our journal."""
         return self.state == State.RETURNING and (self.direct or self.autopilot_returns)
+
+    @property
+    def goes_on_by(self) -> Event:
+        """What ends a hold that no person has ordered: it goes on with what it did."""
+        if self.homeward:
+            return Event.RETURN
+        found = self.settled and self.found is not None  # and not one that the search went on after
+        return Event.CONFIRMED if found else Event.RESUME
 
     @property
     def flying(self) -> bool:

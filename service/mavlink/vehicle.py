@@ -204,18 +204,19 @@ class Vehicle:
         system id, that one alone; `connect` waits for it. Nothing is known of it until then, and it is not ours."""
         self._shell.forget(system_id)
 
-    async def enter_guided(self, *, there: bool = False) -> None:
+    async def enter_guided(self, *, there: bool = False, out_of: str | None = None) -> None:
         """On an operator's order: enter the guided mode if need be, and take control.
 
         Args:
             there: nobody has ordered it: its pilot gives the aircraft over by having selected the mode.
+            out_of: nobody has ordered it just now: only out of this mode, which its pilot may have left since.
 
         Raises:
             NotPermitted: the vehicle is not heard, or is not in the mode where it has to be `there`.
             CommandFailed: it does not enter the mode.
         """
         self._shell.pump()
-        if not self.telemetry.guided and there:
+        if not self.telemetry.guided and (there or out_of not in (None, self.telemetry.mode)):
             raise NotPermitted(f"its pilot has selected {mode_title(self.telemetry.mode)}")
         if not self.telemetry.guided or self._core.goes_by_itself(self._clock.now()):
             autopilot = self._need_autopilot()

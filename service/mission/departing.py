@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from service.mission.effects import (
     Action,
@@ -247,7 +248,8 @@ class TakingOff(Phase):
             if look.now >= self._patient_until:
                 yield self._in_vain(self._failed.reason, look)
         elif not look.busy and self._left:
-            yield self._left[0]
+            step, mode = self._left[0], look.seen.telemetry.mode
+            yield replace(step, out_of=mode) if isinstance(step, EnterGuided) else step
 
     def _wait(self, doubts: str, look: Look) -> Iterator[Wish]:
         """What would hold it in the air keeps it on the ground, for as long as arming would be tried."""

@@ -67,7 +67,7 @@ class Holding(Phase):
                 yield Release(cause, f"{_GOOD[cause]} again")
             elif not look.busy and now >= self._guided_at:  # it braked in a mode of its own
                 self._guided_at = now + RETRY_S
-                yield EnterGuided()
+                yield EnterGuided(out_of=t.mode)
         elif not causes & STAYS and (why := hold_objection(now - standing.since, look.settings.flight)):
             direct = standing.homeward or bool(causes & BLIND)
             yield Happen(Event.RETURN, why, stopped=why, direct=direct)

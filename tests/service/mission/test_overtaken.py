@@ -113,6 +113,8 @@ def test_a_mode_that_the_pilot_selected_is_not_left_without_an_order(flavor: str
             mode = vehicle.telemetry.mode
             with pytest.raises(NotPermitted, match="its pilot has selected R"):
                 await vehicle.enter_guided(there=True)
+            with pytest.raises(NotPermitted, match="its pilot has selected R"):
+                await vehicle.enter_guided(out_of="BRAKE")
             await mission.clock.sleep(3.0)
             assert vehicle.telemetry.mode == mode
 
@@ -183,3 +185,25 @@ def test_a_hold_is_not_undone_by_a_word_on_a_place_that_was_given_before_it_and_
             assert mission.state == State.HOLDING
 
     asyncio.run(fly())
+
+
+def test_what_no_person_orders_just_now_leaves_no_mode_but_the_one_that_was_seen() -> None:
+    """The mode that a pilot selects may be read in the very moment in which ours is to be sent."""
+    talk = searching()
+    talk.shows(fix=1)
+    talk.tick()
+    talk.shows(guided=False, mode="BRAKE", fix=3)
+    talk.pass_by(10.0)
+    braked = talk.doing()
+    assert isinstance(braked, EnterGuided)
+    assert braked.out_of == "BRAKE"
+    talk = reached(State.TAKEOFF, mode="STABILIZE", guided=False)
+    talk.tick()
+    first = talk.doing()
+    assert isinstance(first, EnterGuided)
+    assert first.out_of == "STABILIZE"
+    talk = reached(State.YIELDED)
+    talk.on(Order("resume", 7))
+    ordered = talk.doing()
+    assert isinstance(ordered, EnterGuided)
+    assert (ordered.there, ordered.out_of) == (False, None)

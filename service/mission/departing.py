@@ -37,11 +37,12 @@ from service.mission.phase import (
     warn,
 )
 from service.mission.situation import hovering, on_ground
-from service.mission.standing import Look, Standing
+from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing
 from service.mission.states import Event, State
 from service.rows import CommandRow
 
 ALOFT_M = 5.0  # so high above home nothing that is armed is on the ground, whatever it says
+LACKS_S = 10.0  # for so long what it lacks may be told yet
 AS_LEFT = "as it was before the restart"
 
 
@@ -80,6 +81,23 @@ class Waiting(Phase):
                 return
             self._asked, self._not_before = False, look.now + RETRY_S
             yield Note(f"the next sortie's aircraft is still waited for: {news.reason}")
+
+
+class Lacks:
+    """Says what the aircraft lacks that a search needs, while somebody is to take it up by hand: it would be waited for
+    in silence, or flown up in vain."""
+
+    def __init__(self) -> None:
+        self._since, self._told = math.inf, ""
+
+    def tick(self, look: Look) -> Iterator[Wish]:
+        """Say it once it has been so for a while, and again when it is something else."""
+        lacks = "; ".join(look.seen.missing)
+        self._since = min(self._since, look.now) if lacks else math.inf
+        lasts = look.now - self._since >= max(LACKS_S, LEAST_PATIENCE_WALL_S * look.terms.speedup)
+        if lasts and lacks != self._told and look.heard():
+            self._told = lacks
+            yield from warn(f"no search with this aircraft: {lacks}", look)
 
 
 class Handover:
@@ -127,7 +145,7 @@ class Ready(Phase):
     def __init__(self, left: Standing) -> None:
         self._left = left
         self._begun = self._taking_off = False
-        self._handover = Handover()
+        self._handover, self._lacks = Handover(), Lacks()
 
     def tick(self, look: Look) -> Iterator[Wish]:
         """Get ready, or wait for whoever flies."""
@@ -136,6 +154,7 @@ class Ready(Phase):
             self._begun = True
             yield from self._begin(look)
             return
+        yield from self._lacks.tick(look)
         if on_ground(t):
             yield Stand()
             if self._left.goes_home:

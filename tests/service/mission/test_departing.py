@@ -10,7 +10,7 @@ import pytest
 from service.mavlink.events import ArmedChanged
 from service.mavlink.telemetry import Home
 from service.mavlink.vehicle import climb_s
-from service.mission.departing import AS_LEFT
+from service.mission.departing import AS_LEFT, LACKS_S
 from service.mission.effects import (
     Answer,
     Arm,
@@ -32,6 +32,7 @@ from service.mission.states import Event, State, next_state
 from service.rows import CommandRow
 from sim.soak import ground
 from tests.service.mission.flown import LEFT_US, ON_GROUND, Talk, reached
+from tests.service.mission.test_grounded import grounded
 
 STEPS = [Connect(), WaitReady(), EnterGuided(), Arm(), TakeOff(15.0)]
 
@@ -442,3 +443,17 @@ def test_a_take_off_that_fails_on_the_ground_stays_there() -> None:
 def test_a_slow_climb_is_given_its_time() -> None:
     assert climb_s(70.0, None) == climb_s(70.0, 2.5) == 120.0
     assert climb_s(100.0, 0.5) > 100.0 / 0.5
+
+
+@pytest.mark.parametrize("state", [State.READY, State.GROUNDED])
+def test_who_takes_off_by_hand_hears_before_what_the_aircraft_lacks(state: State) -> None:
+    lacks = "it does not tell whether it is in the air (EXTENDED_SYS_STATE)"
+    talk = reached(state, **{**ON_GROUND, **LEFT_US}) if state == State.READY else grounded()
+    talk.tick()
+    talk.sees(missing=(lacks,))
+    talk.wanted.clear()
+    talk.pass_by(LACKS_S - 1.0)
+    assert not [each for each in talk.wanted if isinstance(each, Tell) and lacks in each.text]
+    talk.pass_by(20.0)
+    assert len([each for each in talk.wanted if isinstance(each, Tell) and lacks in each.text]) == 1
+    assert lacks in talk.core.standing.why

@@ -64,7 +64,7 @@ from service.mission.news import (
     Order,
     Thought,
 )
-from service.mission.orders import judged, ordered, sensible
+from service.mission.orders import gives_back, judged, ordered, sensible
 from service.mission.phase import (
     Begin,
     Enter,
@@ -104,7 +104,6 @@ from service.mission.watch import VehicleWatch
 from service.reasons import Reason
 from service.rows import DecisionRow, ReplacedRow, TransitionRow
 
-HOW = {State.YIELDED: "; Resume gives it back"}
 _BEFORE_FLIGHT = (State.READY, State.TAKEOFF)
 _WARNING = logging.WARNING
 GIVEN_UP_AFTER = 10  # waypoints that the ground forbids
@@ -450,7 +449,8 @@ class MissionCore:
         self._enter(before, after, wish)
         self._emit(WriteRow(TransitionRow(before, wish.event, after, wish.reason)))
         self._emit(Note(f"{before} → {after}: {wish.reason}"))
-        self._emit(Tell(f"search {after}: {wish.told or wish.reason}{HOW.get(after, '')}"))
+        how = f"; {gives_back(self._look())}" if after == State.YIELDED else ""
+        self._emit(Tell(f"search {after}: {wish.told or wish.reason}{how}"))
         return True
 
     def _enter(self, before: State, after: State, wish: Happen) -> None:

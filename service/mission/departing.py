@@ -198,7 +198,7 @@ class Ready(Phase):
             )
         elif why := look.helm.unfit(t, look.seen.others):
             yield GiveUp(why)
-        elif down and terms.may_take_off and not self._order_needed(look):
+        elif down and terms.may_take_off and not order_needed(look):
             self._taking_off = True
             yield WaitReady()
         else:
@@ -223,10 +223,11 @@ class Ready(Phase):
         waits = look.settings.run.next_sortie_within_s > 0.0 and not self._left.goes_home
         return waits and look.flight.flown and not look.terms.may_take_off_again
 
-    def _order_needed(self, look: Look) -> bool:
-        """Whether only an order of now lets it take off, and no flag of an earlier hour."""
-        terms = look.terms
-        return terms.restarted or (look.flight.flown and not terms.may_take_off_again)
+
+def order_needed(look: Look) -> bool:
+    """Whether only an order of now lets it take off, and no flag of an earlier hour."""
+    terms = look.terms
+    return terms.restarted or (look.flight.flown and not terms.may_take_off_again)
 
 
 def climb(look: Look) -> Happen:

@@ -173,3 +173,10 @@ def _ours(look: Look) -> bool:
     """The aircraft is in our hands, and follows our waypoints."""
     t = look.seen.telemetry
     return t.in_control and t.guided and not look.standing.autopilot_returns
+
+
+def gives_back(look: Look) -> str:
+    """What a person does who gives a yielded aircraft back."""
+    if not on_ground(look.seen.telemetry):
+        return "Resume gives it back"
+    return "Launch gives it back" if look.terms.may_take_off else "take off, then Resume gives it back"

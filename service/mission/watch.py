@@ -25,7 +25,9 @@ from service.mavlink.events import (
     VehicleEvent,
 )
 from service.mavlink.telemetry import Telemetry
+from service.mission.departing import order_needed
 from service.mission.effects import Note, Tell, WriteRow
+from service.mission.orders import gives_back
 from service.mission.phase import Happen, Hold, Lost, Overtaken, Stay, Wish, touchdown
 from service.mission.situation import on_ground
 from service.mission.standing import Look, Standing
@@ -61,13 +63,14 @@ class VehicleWatch:
         yield from LISTENERS[type(event)](self, event, look)
 
     def _taken(self, why: str, look: Look) -> Iterator[Wish]:
-        """The aircraft is somebody else's now. One that is waited for, until its pilot hands it over, is so anyway."""
+        """The aircraft is somebody else's now. One that is waited for, until its pilot hands it over, is so anyway, but
+        for one that we are about to take off with."""
         state = look.standing.state
         yield Overtaken(why)
         if state in _THEIRS:
             yield Stay(why)
             yield WriteRow(YieldedRow(why))
-        elif state not in _WAITS or look.terms.may_take_off:
+        elif state not in _WAITS or (look.terms.may_take_off and (look.busy or not order_needed(look))):
             yield Happen(Event.PILOT, why)
 
     # ---- the listeners
@@ -83,7 +86,7 @@ class VehicleWatch:
     def _mode(self, event: ModeChanged, look: Look) -> Iterator[Wish]:
         """What follows when the aircraft is in the guided mode again, and nobody has said whose it is."""
         if look.standing.state == State.YIELDED and event.guided and not event.commanded:
-            yield Tell(f"search YIELDED: in {look.seen.guided_title} again; Resume gives it back", 5)
+            yield Tell(f"search YIELDED: in {look.seen.guided_title} again; {gives_back(look)}", 5)
 
     def _stalled(self, event: Stalled, look: Look) -> Iterator[Wish]:
         self._stalled_at = event.time

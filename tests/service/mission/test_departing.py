@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from service.mavlink.events import ArmedChanged
+from service.mavlink.events import ArmedChanged, ModeChanged
+from service.mavlink.modes import ModeKind
 from service.mavlink.telemetry import Home
 from service.mavlink.vehicle import climb_s
 from service.mission.departing import AS_LEFT, LACKS_S
@@ -457,3 +458,21 @@ def test_who_takes_off_by_hand_hears_before_what_the_aircraft_lacks(state: State
     talk.pass_by(20.0)
     assert len([each for each in talk.wanted if isinstance(each, Tell) and lacks in each.text]) == 1
     assert lacks in talk.core.standing.why
+
+
+def test_after_a_restart_who_takes_off_by_hand_as_ready_says_gives_the_aircraft_over() -> None:
+    talk = Talk(may_take_off=True, **{**ON_GROUND, **LEFT_US, "mode": "STABILIZE"})
+    talk.core.terms = replace(talk.core.terms, restarted=True)
+    talk.tick()
+    talk.done()
+    talk.pass_by(3.0)
+    assert Tell("search READY: order launch, or take off and select the guided mode") in talk.wanted
+    talk.pilot("LOITER")
+    talk.shows(armed=True, landed_state="in_air", alt_home_m=15.0, alt_amsl_m=415.0)
+    talk.pass_by(2.0)
+    talk.shows(mode="GUIDED", guided=True)
+    talk.on(ModeChanged(talk.now, "GUIDED", "LOITER", ModeKind.GUIDED, True, False, False))
+    talk.pass_by(2.0)
+    assert (talk.state, talk.doing()) == (State.READY, EnterGuided())
+    talk.done()
+    assert talk.state == State.SEARCHING

@@ -166,6 +166,16 @@ def test_a_yield_always_says_how_to_give_the_aircraft_back() -> None:
     assert talk.state == State.YIELDED
 
 
+@pytest.mark.parametrize(
+    ("may_take_off", "how"), [(True, "Launch gives it back"), (False, "take off, then Resume gives it back")]
+)
+def test_a_yield_on_the_ground_says_what_is_not_refused_there(may_take_off: bool, how: str) -> None:
+    talk = reached(State.HOLDING, may_take_off=may_take_off)
+    talk.shows(**ON_GROUND)
+    (told, *_) = [effect.text for effect in talk.pilot("STABILIZE") if isinstance(effect, Tell)]
+    assert told.endswith(how)
+
+
 def test_a_hold_that_another_restart_or_landing_finds_on_the_ground_is_not_over() -> None:
     """A pilot who chose a mode before the flight has not landed."""
     talk = reached(State.TAKEOFF)

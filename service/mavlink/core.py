@@ -150,10 +150,12 @@ class LinkCore(LinkMemory):
         Raises:
             NotPermitted: it is not ours to move now, or the place is not one to fly to. Nothing was sent.
         """
+        return self._go_to(Target(lat, lon, alt_amsl_m), now, stops=False)
+
+    def _go_to(self, target: Target, now: float, *, stops: bool) -> Target:
         self._wake(now)
-        target = Target(lat, lon, alt_amsl_m)
         reason = self.why_not_reposition(now) or gates.why_not_there(self.telemetry, self.settings, target)
-        if reason is None and self._strangers.suspect is not None:
+        if reason is None and not stops and self._strangers.suspects(now):
             reason = "somebody else may just have given the aircraft a target"
         if reason is not None:
             raise NotPermitted(f"no waypoint was sent: {reason}")
@@ -177,7 +179,7 @@ class LinkCore(LinkMemory):
             raise NotPermitted("no waypoint was sent: the position of the aircraft is not known")
         stop = stopping_point(t, autopilot.stopping_distance_m(t.ground_speed_mps))
         altitude = max(stop.alt_amsl_m, least_amsl_m) if math.isfinite(least_amsl_m) else stop.alt_amsl_m
-        self.reposition(stop.lat, stop.lon, altitude, now)
+        self._go_to(replace(stop, alt_amsl_m=altitude), now, stops=True)
 
     def brake(self, now: float) -> None:
         """Stop where it can, without a position of ours: the autopilot's own way; see `hold` for what ends with it.
@@ -505,7 +507,7 @@ class LinkCore(LinkMemory):
 
     def _push_target(self, now: float) -> None:
         step, target = self._watch.due(now), self._watch.target
-        if step is None or target is None or self._strangers.suspect is not None:
+        if step is None or target is None or self._strangers.suspects(now):
             return  # who may just have given it another is not overridden by a repetition either
         reason = self.why_not_reposition(now)
         if step is Step.RESEND and reason is None:

@@ -78,6 +78,23 @@ def test_a_waypoint_waits_while_somebody_else_may_just_have_given_one(flavor: st
 
 
 @FLAVORS
+def test_a_suspicion_that_nothing_follows_ends_and_never_keeps_a_stop_from_going_out(flavor: str) -> None:
+    rig = searching(flavor)
+    rig.now += 0.1
+    rig.peer.target = (LAT - 0.001, LON, ALT)
+    rig.say(rig.peer.position_target(rig.now))
+    rig.peer.target = None  # the stream stops
+    with pytest.raises(NotPermitted, match="somebody else"):
+        go(rig, LAT + 0.0006)
+    rig.forget()
+    rig.core.hold(rig.now)
+    rig.run(0.1)
+    assert len(rig.motion()) == 1
+    rig.run(5.5)
+    go(rig, LAT + 0.0006)
+
+
+@FLAVORS
 def test_who_was_overtaken_by_a_waypoint_on_its_way_gets_the_aircraft(flavor: str) -> None:
     rig = searching(flavor)
     go(rig, LAT + 0.0006)

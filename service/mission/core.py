@@ -88,7 +88,7 @@ from service.mission.phase import (
 )
 from service.mission.reserve import Reserve
 from service.mission.situation import Situation, on_ground
-from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing, Terms
+from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing, Terms, one_more
 from service.mission.states import (
     FINAL,
     FLYING,
@@ -368,8 +368,7 @@ class MissionCore:
             case Lost():
                 self._phase.lost(self._look())
             case Stay(why=why):
-                if why not in self.standing.why:
-                    self._change(why=f"{self.standing.why}; {why}")
+                self._change(why=one_more(self.standing.why, why))
             case GiveUp(reason=reason):
                 self._emit(Note(reason, logging.ERROR))
                 self._give_up(reason, stop=True, then="hovering")

@@ -15,6 +15,14 @@ from service.mission.states import FLYING, Event, State
 
 LEAST_PATIENCE_WALL_S = 1.5
 
+_FIRST, _LAST = 200, 300  # characters of a reason that has become too long
+
+
+def one_more(why: str, more: str) -> str:
+    """A reason with one more, unless it has that: what came first and what came last, however many there were."""
+    said = why if more in why else f"{why}; {more}"
+    return said if len(said) <= _FIRST + _LAST else f"{said[:_FIRST]} ... {said[-_LAST:]}"
+
 
 @dataclass(frozen=True, slots=True)
 class Standing:

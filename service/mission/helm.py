@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from service.config import Settings
-from service.geometry import LatLon
+from service.geometry import LatLon, between
 from service.mavlink.events import Target
 from service.mavlink.target import distance_m
 from service.mavlink.telemetry import Telemetry, Wind
@@ -160,9 +160,9 @@ class Helm:
 
     def stop_place(self, t: Telemetry) -> LatLon:
         """Where the aircraft comes to a stand, or as near to that as the search may be."""
-        (lat, lon), (lat2, lon2) = here(t), self.stands(t)
+        stands = self.stands(t)
         for share in (1.0, 0.75, 0.5, 0.25):
-            point = lat + share * (lat2 - lat), lon + share * (lon2 - lon)
+            point = between(here(t), stands, share)
             if self.allows(point):
                 return point
         return here(t)

@@ -24,6 +24,7 @@ from service.mavlink import gates
 from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.autopilots.registry import autopilot_for
 from service.mavlink.command import Command, result_name, set_message_interval
+from service.mavlink.company import TAKES
 from service.mavlink.errors import NotPermitted
 from service.mavlink.events import (
     AnotherService,
@@ -394,6 +395,9 @@ class LinkCore(LinkMemory):
         reason = self._company.on_ack(message, ours=named == us, now=now) if named[1] else ""
         self._tell_another(reason, now)
         if named not in ((0, 0), (us[0], 0), us):
+            t, accepted = self.telemetry, message.result == mavlink.MAV_RESULT_ACCEPTED
+            if accepted and message.command in TAKES and t.in_control and t.guided and t.armed:
+                self._replaced(None, self._company.commander(now), now)
             return
         self._hearing.on_answer()
         if message.command == mavlink.MAV_CMD_DO_REPOSITION:
@@ -447,11 +451,16 @@ class LinkCore(LinkMemory):
         if stranger is not None:
             failsafe = any("failsafe" in text.lower() for text in self._lately_said(now))
             by = "the autopilot's failsafe" if failsafe else self._company.commander(now)
-            self._watch.clear()
-            self._control.lose(f"{by} has given the aircraft another target")
-            self._stand_down("the aircraft was given another target", now)
-            self._strangers.start_over()
-            self._events.append(TargetReplaced(now, target, stranger, by))
+            self._replaced(stranger, by, now)
+
+    def _replaced(self, found: Target | None, by: str, now: float) -> None:
+        """Somebody else sends it somewhere, or has it do something else: it is theirs."""
+        ours = self._watch.target
+        self._watch.clear()
+        self._control.lose(f"{by} has given the aircraft another target")
+        self._stand_down("the aircraft was given another target", now)
+        self._strangers.start_over()
+        self._events.append(TargetReplaced(now, ours, found, by))
 
     def _heard_texts(self, texts: list[StatusText], now: float) -> None:
         for text in texts:

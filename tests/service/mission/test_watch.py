@@ -155,6 +155,12 @@ def test_whoever_else_sends_the_aircraft_somewhere_gets_it(state: State) -> None
     assert not [effect for effect in talk.pass_by(60.0) if isinstance(effect, (Stop, SendWaypoint))]
 
 
+def test_who_commands_the_aircraft_without_a_target_that_is_known_gets_it() -> None:
+    talk = searching()
+    talk.on(replace(replaced(talk.now), found=None))
+    assert (talk.state, talk.core.standing.why) == (State.YIELDED, "a ground station commands the aircraft")
+
+
 def test_a_yield_always_says_how_to_give_the_aircraft_back() -> None:
     talk = searching()
     (told,) = [effect.text for effect in talk.pilot() if isinstance(effect, Tell)]

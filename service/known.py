@@ -21,6 +21,7 @@ from roisearch.detection import DetectionRecord
 from roisearch.walk import MOST_S
 from roisearch.watch import LOOKED
 from service.area import Grid
+from service.area.projection import FloatArray
 from service.evidence.alarms import Alarms
 from service.evidence.cover import detection_p
 from service.evidence.observe import Observation
@@ -61,6 +62,8 @@ class Known:
 
     def __init__(self, grid: Grid, p_tp: float, p_tn: float) -> None:
         self._grid, self._rates = grid, (p_tp, p_tn)
+        self._priors: dict[frozenset[str], FloatArray] = {}
+        """The priors without what is refuted, by that: they take long on a large map."""
         self.since: float | None = None
         """Of the first word, as `time`: the prior is taken to be of then."""
         self._said: list[tuple[float, Said]] = []
@@ -70,16 +73,20 @@ class Known:
             tuple[Known, int]
         ] = []  # earlier states, the oldest first, and how much was said by then
         self._begin()
+        self.told_mass = self.belief.probability()
+        """Where the target was believed to be when news came last, float [rows, cols]: what is flown after an exclusion
+        depends on it, and has to be the same whenever it is asked for."""
 
     def _begin(self) -> None:
         """As it was before anything was seen, with the clues that stand."""
-        grid, prior, outside = self._grid, self._grid.prior, self._grid.outside
+        grid, outside = self._grid, self._grid.outside
+        prior = assumed = self._assumed()
         for news in self.news:
             if news.role == "clue":
                 prior = prior.copy()
                 prior[news.cells[:, 0], news.cells[:, 1]] *= news.values
-        if prior is not grid.prior:
-            mass = (1.0 - grid.outside) * float(prior.sum()) / float(grid.prior.sum())
+        if prior is not assumed:
+            mass = (1.0 - grid.outside) * float(prior.sum()) / float(assumed.sum())
             outside = grid.outside / (grid.outside + mass)
         self.time: float | None = None
         """Of the last word, seconds since the epoch; None before the first, and wherever the target stands still."""
@@ -90,6 +97,15 @@ class Known:
         self.alarms = Alarms(*self._rates)
         self.confirmed: Cell | None = None
         """The place that an operator said is the target's."""
+
+    def _assumed(self) -> FloatArray:
+        """The prior of the area file, float [rows, cols], without what is refuted."""
+        refuted = frozenset(news.prior for news in self.news if news.role == "refute")
+        if not refuted:
+            return self._grid.prior
+        if refuted not in self._priors:
+            self._priors[refuted] = self._grid.prior_without(refuted)
+        return self._priors[refuted]
 
     @property
     def news(self) -> list[FieldNews]:
@@ -118,14 +134,22 @@ class Known:
         self._said.append((moment, said))
         if isinstance(said, (FieldNews, Withdrawn)):
             self._field.append(said)
-            self._kept = []
-            self._begin()
-            self._believe_all(self._said)
+            if self._moves(said):
+                self._kept = []
+                self._begin()
+                self._believe_all(self._said)
+            self.told_mass = self.belief.probability()
         elif self._is_late(moment):
             self._believe_all(self._go_back(moment))
         else:
             self._believe(said, moment)
             self._keep()
+
+    def _moves(self, said: FieldNews | Withdrawn) -> bool:
+        """Whether news, or news taken back, may change what is believed: an exclusion says nothing of the target, and
+        where that stands still the time at which it is told says nothing either."""
+        news = self.heard_as(said.id) if isinstance(said, Withdrawn) else said
+        return self._grid.walk is not None or news is None or news.role != "exclude"
 
     @property
     def kept(self) -> int:

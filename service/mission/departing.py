@@ -213,7 +213,8 @@ class Ready(Phase):
                 f"{first}select {look.seen.guided_title}: the search starts when the aircraft hovers in it"
             )
             yield Tell(f"search READY: {first}select {look.seen.guided_title}")
-        for said in [look.helm.far(t), *look.helm.of_the_ground(t)]:
+        by_hand = "" if terms.may_take_off else lands_beside(look)
+        for said in [look.helm.far(t), by_hand, *look.helm.of_the_ground(t)]:
             if said:
                 yield Note(said, 30)
                 yield Tell(f"search: {said}", 4)
@@ -228,6 +229,11 @@ def order_needed(look: Look) -> bool:
     """Whether only an order of now lets it take off, and no flag of an earlier hour."""
     terms = look.terms
     return terms.restarted or (look.flight.flown and not terms.may_take_off_again)
+
+
+def lands_beside(look: Look) -> str:
+    """What a person must know of two that land at one place, before the flight; the built-in world has no such fear."""
+    return "" if look.settings.mock else look.helm.beside(look.seen.telemetry, look.seen.others)
 
 
 def climb(look: Look) -> Happen:
@@ -264,6 +270,8 @@ class TakingOff(Phase):
             t = look.seen.telemetry
             if why := look.helm.unfit(t, look.seen.others) or look.helm.too_empty(t, look.seen.others):
                 yield self._in_vain(why, look)
+            elif beside := lands_beside(look):
+                yield from warn(beside, look)
         if self._failed is not None:
             if look.now >= self._patient_until:
                 yield self._in_vain(self._failed.reason, look)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from service.chances import sure
 from service.mission.departing import Handover, Lacks, climb
 from service.mission.effects import Connect, Note, WaitReady
 from service.mission.news import Done, Failed, News
@@ -35,6 +36,10 @@ class Grounded(Phase):
         """Wait for a battery, for whoever flies, or for too long."""
         t, standing = look.seen.telemetry, look.standing
         waits_s = look.settings.run.next_sortie_within_s
+        if look.seen.searched >= look.seen.enough:  # by others, meanwhile: nothing is left to fly for
+            why = f"searched to POS {sure(look.seen.searched)}"
+            yield Happen(Event.FINISH, why, stopped=why, searched=True)
+            return
         if not self._told:
             self._told = True
             yield from say(f"the search is not finished: {how_to_fly(look)}, or finish", look)

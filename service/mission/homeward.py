@@ -91,7 +91,7 @@ class Homeward(Phase):
             self._way, self._resting = None, True
             yield Rest()
             yield from warn(f"{why}: the autopilot flies home by itself", look)
-        if self._way is not None:
+        if self._way is not None and not self._resting:  # who lands already makes room by being down
             yield from self._fly(self._way, look)
             if not self._way.flown:
                 return

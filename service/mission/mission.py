@@ -205,6 +205,10 @@ class Mission:
         """The orders that would change something now."""
         return self.core.orders(self._outlook.situation())
 
+    def concerned(self, command: str) -> bool:
+        """Whether an order means something to it as it is now, be it that it is carried out already."""
+        return self.core.concerned(command, self._outlook.situation())
+
     # ---- what happens
 
     async def run(self) -> None:

@@ -54,6 +54,7 @@ class Outlook:
             ),
             searched=search.record.searched,
             enough=search.enough,
+            left_out=search.left_out,
             place_probability=search.place.probability if looks else 0.0,
             place_in_sight=place_in_sight(search) if looks else True,
             found=search.found() if looks else None,

@@ -115,10 +115,27 @@ class Settle:
 
 
 @dataclass(frozen=True, slots=True)
+class Unsettle:
+    """A sortie may follow the one under way all the same, for this reason."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class Stay:
     """The state stays, for one more reason."""
 
     why: str
+
+
+@dataclass(frozen=True, slots=True)
+class ComeUp:
+    """What is ordered (`event`) of an aircraft that is not heard yet: it comes up so once it is. Answered by `ticket`;
+    0: nobody asked."""
+
+    event: Event
+    why: str
+    ticket: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +170,9 @@ Wish = (
     | Stand
     | GoOn
     | Settle
+    | Unsettle
     | Stay
+    | ComeUp
     | Overtaken
     | Pending
 )

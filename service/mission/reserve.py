@@ -27,7 +27,7 @@ class Reserve:
         self._return_m = flight.return_height_m
         self._consumption, self._wind, self._level = Consumption(), WindFelt(flight), Level()
         self._route: list[LatLon] = []
-        self._routed_from: LatLon = (math.inf, math.inf)
+        self._routed_from = self._routed_to = (math.inf, math.inf)
         self.energy = Energy(None, None, WayHome(0.0, 0.0, 0.0))
         self.wind: Wind | None = None
         """As told, else as reckoned; None while it is not known."""
@@ -51,11 +51,20 @@ class Reserve:
             level = self._consumption.level(t.battery_percent, now)
         self.energy = Energy(percent, rate, home, told, t.battery_state, level, self.wind, doubt)
 
+    def forget_way(self) -> None:
+        """Other ground is excluded now: the way home may lead elsewhere."""
+        self._route = []
+
     def _way(self, t: Telemetry) -> list[Metres]:
         """From here home around the exclusions, as (east, north) of here in metres."""
-        lat, lon = here(t)
-        if not self._route or self._chart.distance((lat, lon), self._routed_from) > _MOVED_M:
-            self._route, self._routed_from = self._chart.route((lat, lon), self._chart.home(t)), (lat, lon)
+        (lat, lon), home = here(t), self._chart.home(t)
+        moved = self._chart.distance((lat, lon), self._routed_from) > _MOVED_M
+        if not self._route or home != self._routed_to or moved:
+            self._route, self._routed_from, self._routed_to = (
+                self._chart.route((lat, lon), home),
+                (lat, lon),
+                home,
+            )
             if self._highest_m is not None:
                 ours = self._highest_m([(lat, lon), *self._route])
                 self._return_m = max(ours, self._flight.return_height_m)

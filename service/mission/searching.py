@@ -37,7 +37,7 @@ from service.mission.news import Done, Failed, Hit, MapChanged, News, NotSent, N
 from service.mission.phase import RETRY_S, Begin, Enter, Happen, Hold, Listen, Phase, Way, Wish
 from service.mission.situation import Situation
 from service.mission.standing import Look
-from service.mission.states import Event, State
+from service.mission.states import SEARCHED_TO, Event, State
 from service.motion import MotionLimits, motion_of
 
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
@@ -186,7 +186,7 @@ class Searching(Phase):
         elif seen.place_probability < CLEARED_BELOW:
             yield Happen(Event.CLEARED, f"the place is no longer likely, {share(seen.place_probability)}")
         if seen.searched >= seen.enough and look.standing.state == State.SEARCHING and not suspect:
-            yield _searched(f"searched to POS {sure(seen.searched)}")
+            yield _searched(f"{SEARCHED_TO} {sure(seen.searched)}{seen.left_out}")
         elif look.flight.steps >= settings.search.max_steps:
             yield _searched(f"{look.flight.steps} steps flown")
         elif look.detector_silent():

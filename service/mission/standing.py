@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from service.config import Settings
 from service.evidence.found import Found
@@ -35,6 +35,7 @@ class Standing:
         why_stopped: why the search ended or the run was broken off; empty while it goes on.
         searched: the search ended because there was nothing more to gain, not by an order.
         settled: nothing is left to fly for: it was searched enough, found, or an operator has finished it.
+        enough: it is settled because it was searched enough, which news may change.
         found: the place that counts as found.
         causes: what it holds for; the hold ends when none is left.
         homeward: it flies home, or holds on the way there, or waits after a restart that found it so.
@@ -49,6 +50,7 @@ class Standing:
     why_stopped: str = ""
     searched: bool = False
     settled: bool = False
+    enough: bool = False
     found: Found | None = None
     causes: frozenset[str] = frozenset()
     homeward: bool = False
@@ -78,6 +80,38 @@ class Standing:
     def flying(self) -> bool:
         """It searches."""
         return self.state in FLYING
+
+
+_ALOFT = (State.TAKEOFF, *FLYING, State.FOUND, State.HOLDING, State.RETURNING)
+
+
+def as_asked(left: Standing, event: Event, why: str) -> Standing | None:
+    """How a run that was left so comes up where a hold, a return or the finish is wanted before its aircraft is heard.
+
+    None where that changes nothing: what its pilot has and what waits between two sorties moves by a fresh order only,
+    and what has not flown is over when it is finished. Before the first flight a return is a hold on the ground.
+    """
+    if left.state in (State.YIELDED, State.GROUNDED):
+        return None
+    if left.state not in _ALOFT:
+        return None if event == Event.FINISH else replace(left, state=State.HOLDING, why=why)
+    if event == Event.HOLD:
+        return replace(left, state=State.HOLDING, why=why)
+    over = event == Event.FINISH
+    return replace(
+        left,
+        state=State.RETURNING,
+        why=why,
+        why_stopped=why if over else left.why_stopped or why,
+        searched=left.searched or over,
+        settled=left.settled or over,
+    )
+
+
+def may_be_aloft(left: Standing, flight: Flight) -> bool:
+    """Whether an aircraft may be in the air of which is known only how an earlier process left its run."""
+    flew = left.state in (*_ALOFT, State.YIELDED) and flight.aloft_s(flight.left_at) > 0.0
+    return flew or left.state == State.TAKEOFF
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from service.view.state import (
     FootprintCell,
     FootprintState,
     FoundState,
+    GeometryState,
     NewsState,
     PlaceState,
     RunState,
@@ -211,11 +213,12 @@ class BaseView:
         return partial(draw_map, self.ground_now(), self.seen().copied())
 
 
-def sortie_states(sorties: Sequence[SortieRow]) -> list[SortieState]:
-    """The flights that are over, as they are told."""
+def sortie_states(sorties: Sequence[SortieRow], aircraft: str) -> list[SortieState]:
+    """The flights of an aircraft that are over, as they are told."""
     return [
         {
             "number": each.number,
+            "aircraft": aircraft,
             "landed": each.landed,
             "flight_time_s": each.seconds,
             "steps": each.steps,
@@ -238,6 +241,7 @@ def news_states(news: Sequence[FieldNews]) -> list[NewsState]:
             "lat": each.place[0],
             "lon": each.place[1],
             "cells": len(each.cells),
+            "geometry": cast(GeometryState | None, each.drawn),
         }
         for each in news
     ]

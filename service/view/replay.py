@@ -124,6 +124,7 @@ class ReplayView(BaseView):
         """Where the search stood; what a journal does not hold is None."""
         told, now = self._told[self._at - 1], self.times[self._at - 1]
         flight = told.leading
+        flying = next(name for name, each in told.flights.items() if each is flight)
         decision, pose = flight.decision, flight.pose
         return {
             "state": flight.state,
@@ -143,7 +144,7 @@ class ReplayView(BaseView):
             "outside": self.search.belief.outside,
             "steps": flight.steps,
             "flight_time_s": flight.flown_s,
-            "sorties": sortie_states(flight.sorties),
+            "sorties": sortie_states(flight.sorties, flying or ONLY),
             "news": news_states(self.search.known.news),
             "flight_left_s": None,
             "battery_percent": None,
@@ -154,9 +155,7 @@ class ReplayView(BaseView):
             "pose": pose_state(pose, self.settings.run.coordinates),
             "height_above_ground_m": self.above_ground(pose),
             "wind": None,
-            "footprint": self.footprint(
-                pose, next(name for name, each in told.flights.items() if each is flight)
-            ),
+            "footprint": self.footprint(pose, flying),
             "reports": reports_state(Counts(accepted=sum(each.reports for each in told.flights.values()))),
             "link": None,
             "detector": None,
@@ -199,6 +198,7 @@ class ReplayView(BaseView):
             "ahead": self._ahead(flight),
             "steps": flight.steps,
             "flight_time_s": flight.flown_s,
+            "sorties": sortie_states(flight.sorties, name or ONLY),
             "pose": pose_state(pose, self.settings.run.coordinates),
             "footprint": self.footprint(pose, name),
         }

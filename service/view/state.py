@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NotRequired
+from typing import Any, NotRequired
 
 from typing_extensions import TypedDict  # what pydantic can read on Python 3.11
 
@@ -159,10 +159,11 @@ class EstimateState(TypedDict):
 
 class SortieState(TypedDict):
     """A flight that is over: its number from 1, when it landed (seconds since the epoch), its seconds in the air and
-    cells of the search, POS after it, why it ended, and the MAVLink system id and the autopilot of the aircraft that
-    flew it, which null does not know."""
+    cells of the search, POS after it, why it ended, the name of the aircraft that flew it (each counts its own), and
+    its MAVLink system id and autopilot, which null does not know."""
 
     number: int
+    aircraft: str
     landed: float
     flight_time_s: float
     steps: int
@@ -172,9 +173,17 @@ class SortieState(TypedDict):
     autopilot: str | None
 
 
+class GeometryState(TypedDict):
+    """A GeoJSON geometry (RFC 7946), longitude first."""
+
+    type: str
+    coordinates: list[Any]
+
+
 class NewsState(TypedDict):
-    """A piece of news that stands: its id, role ("clue" or "searched"), words, the middle of its place, and how many
-    cells it is about."""
+    """A piece of news that stands: its id, role ("clue", "searched", "exclude" or "refute"), words, the middle of its
+    place, how many cells it is about (an exclusion says nothing of any), and its shape for maps, of fewer corners where
+    it has many; null where there is none, and in a run of an early version."""
 
     id: str
     role: str
@@ -182,15 +191,17 @@ class NewsState(TypedDict):
     lat: float
     lon: float
     cells: int
+    geometry: GeometryState | None
 
 
 class HeardState(TypedDict):
-    """What became of a piece of news: "accepted", "duplicate" of an id that was known, or "withdrawn"; and about how
-    many cells it is."""
+    """What became of a piece of news: "accepted", "duplicate" of an id that was known, or "withdrawn"; about how
+    many cells it is; and what a person has to know of what follows."""
 
     id: str
     status: str
     cells: int
+    notes: list[str]
 
 
 class DrawnState(TypedDict):
@@ -222,6 +233,7 @@ class AircraftState(TypedDict):
     ahead: list[LatLon]
     steps: int
     flight_time_s: float
+    sorties: list[SortieState]
     pose: PoseState | None
     footprint: FootprintState
 

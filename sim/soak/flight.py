@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
+import sqlite3
 import subprocess
 import time
 from collections import Counter
@@ -28,7 +29,7 @@ from sim.soak.clocked import SteppedClock
 from sim.soak.eyes import Eyes, grown
 from sim.soak.judge import AFTER, OPERATOR, Judge
 from sim.soak.kinds import AT_BOOT, GROUNDS, KINDS
-from sim.soak.plan import Fault, Plan
+from sim.soak.plan import HOLD, HOME, Fault, Plan
 from sim.soak.process import Process
 from sim.soak.tap import Tap
 from sim.soak.wing import Wing
@@ -184,11 +185,24 @@ class SoakFlight:
             self._pass(fault.wait_s)
             if self._state() in _FINAL:
                 break
+            self._come_to(fault.moment)
             self.outcome.faults[fault.kind] += 1
             self.judge.steady, self.judge.during = KINDS[fault.kind].steady, fault.kind
             self._let(fault)
-            self._recover()
+            if fault.moment != HOME:
+                self._recover()
         self._go_home()
+
+    def _come_to(self, moment: str) -> None:
+        """Let the operator bring about the moment of a fault; what cannot be ordered now is left as it is."""
+        self.judge.during = ""
+        if moment == HOLD:
+            self._order("hold")
+            self.judge.stopped(time.monotonic(), OPERATOR)
+            self._pass(3.0)
+        elif moment == HOME:
+            self._order("return")
+            self._pass(2.0)
 
     def _take_off(self) -> None:
         """The search begins; an operator helps where a person or the autopilot stands in the way."""
@@ -243,12 +257,22 @@ class SoakFlight:
             setattr(eyes, switch, True)
             self._pass(fault.seconds)
             setattr(eyes, switch, False)
+        elif kind == "journal_locked":
+            self._lock_the_journal(fault.seconds)
         elif kind == "operator_holds":
             self._order("hold")
             self.judge.stopped(time.monotonic(), OPERATOR)
             self._pass(fault.seconds)
         else:
             self._let_the_mock(fault)
+
+    def _lock_the_journal(self, seconds: float) -> None:
+        """Another program writes to the journal, and is in no hurry."""
+        journal = self._alive_runs()[0] / "journal.sqlite"
+        with contextlib.closing(sqlite3.connect(journal, timeout=10.0, isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            self._pass(seconds)
+            other.execute("ROLLBACK")
 
     def _let_the_mock(self, fault: Fault) -> None:
         """A fault of the mock's, under its own name."""
@@ -404,7 +428,8 @@ class SoakFlight:
         place = self.plan.target
         target = None if place is None else Target(place, frozenset(true_hits))
         for run in self._alive_runs() if hasattr(self, "_runs") else []:
-            outcome.violations += audit(run, acknowledged, told, target)
+            refuses = "command_refused" in outcome.faults
+            outcome.violations += audit(run, acknowledged, told, target, refuses=refuses)
         for word in _BAD_WORDS:
             if word in outcome.said:
                 line = next(line for line in outcome.said.splitlines() if word in line)

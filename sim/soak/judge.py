@@ -27,6 +27,7 @@ _LEAST_PERCENT = 15.0  # the service goes home at 20
 _UNKNOWN_S = 30.0  # without a level for so long, it is not known on the ground
 _SETTLED_S = 25.0  # a search has reached its height after so long
 _NEAR_M = 60.0  # a stop lies this far ahead at most
+_ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 _BRAKE = 17  # ArduCopter's mode
 _STAND_STILL = "SET_POSITION_TARGET_LOCAL_NED"
 OPERATOR = "the operator's hold"
@@ -130,6 +131,9 @@ class Judge:
             elif message.get_type() in ("SYS_STATUS", "BATTERY_STATUS"):
                 if message.battery_remaining >= 0:
                     self._level = (float(message.battery_remaining), now)
+            elif message.get_type() == "COMMAND_ACK":
+                if message.command == mavlink.MAV_CMD_DO_REPOSITION and message.result != _ACCEPTED:
+                    self._stop = None  # it has not stopped there: the next stop is where it can by then
             elif message.get_type() == "HEARTBEAT":
                 self._armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
                 self._heard_mode(message.custom_mode == self._guided_mode, now)

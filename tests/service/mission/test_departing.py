@@ -30,7 +30,7 @@ from service.mission.flight import Flight
 from service.mission.news import Order
 from service.mission.standing import Standing
 from service.mission.states import Event, State, next_state
-from service.rows import CommandRow
+from service.rows import CommandRow, TransitionRow
 from sim.soak import ground
 from tests.service.mission.flown import LEFT_US, ON_GROUND, Talk, reached
 from tests.service.mission.test_grounded import grounded
@@ -346,6 +346,96 @@ def test_a_person_who_holds_before_the_take_off_is_obeyed() -> None:
     assert "order launch" in answer.refused
     talk.pass_by(60.0)
     assert talk.core.doing is None
+
+
+def at_once(talk: Talk, command: str) -> str:
+    """What an order is answered with, at once."""
+    (answer,) = [each for each in talk.on(Order(command, 7)) if isinstance(each, Answer)]
+    return answer.refused
+
+
+def linked(talk: Talk) -> Talk:
+    """The aircraft is heard, and then a minute passes."""
+    talk.tick()
+    talk.done()
+    talk.pass_by(60.0)
+    return talk
+
+
+@pytest.mark.parametrize("command", ["hold", "return"])
+def test_a_person_who_stops_it_before_it_is_heard_is_obeyed_whatever_a_flag_says(command: str) -> None:
+    talk = Talk(may_take_off=True, **ON_GROUND)
+    talk.tick()
+    assert at_once(talk, command) == ""
+    linked(talk)
+    assert (talk.state, talk.core.doing) == (State.HOLDING, None)
+    assert not [effect for effect in talk.wanted if effect in STEPS[1:]]
+    talk.on(Order("launch", 7))
+    assert talk.doing() == WaitReady()
+
+
+def test_a_return_while_it_gets_ready_to_take_off_keeps_it_on_the_ground() -> None:
+    talk = prepared(1)
+    assert at_once(talk, "return") == ""
+    talk.pass_by(60.0)
+    assert (talk.state, talk.core.doing) == (State.HOLDING, None)
+
+
+@pytest.mark.parametrize(
+    ("left", "command", "comes_up"),
+    [
+        (State.SEARCHING, "hold", State.HOLDING),
+        (State.RETURNING, "hold", State.HOLDING),
+        (State.SEARCHING, "return", State.RETURNING),
+        (State.HOLDING, "return", State.RETURNING),
+        (State.SEARCHING, "finish", State.RETURNING),
+        (State.YIELDED, "hold", State.YIELDED),
+        (State.YIELDED, "return", State.YIELDED),
+    ],
+)
+def test_what_is_ordered_before_it_is_heard_again_in_the_air_is_done_then(
+    left: State, command: str, comes_up: State
+) -> None:
+    flight = Flight(flown=True, carried_s=60.0, left_at=990.0)
+    talk = Talk(may_take_off=True, standing=Standing(state=left), flight=flight, in_control=False)
+    talk.tick()
+    assert bool(at_once(talk, command)) == (left == State.YIELDED)
+    talk.tick()
+    talk.done()
+    talk.pass_by(2.0)
+    if talk.core.doing == EnterGuided(there=True):
+        talk.shows(in_control=True)
+        talk.done()
+        talk.tick()
+    assert talk.state == comes_up
+    assert talk.core.standing.settled == (command == "finish")
+
+
+def test_one_that_is_not_heard_when_the_search_is_over_for_all_flies_home_once_it_is() -> None:
+    flight = Flight(flown=True, carried_s=60.0, left_at=990.0)
+    talk = Talk(standing=Standing(state=State.SEARCHING), flight=flight, in_control=False)
+    talk.sees(over="found")
+    talk.pass_by(2.0)
+    assert talk.state == State.WAITING
+    linked_rows = [row for row in talk.rows if isinstance(row, TransitionRow)]
+    assert [(row.event, row.after) for row in linked_rows] == [(Event.FINISH, State.WAITING)]
+    talk.done()
+    talk.pass_by(2.0)
+    talk.shows(in_control=True)
+    talk.done()
+    talk.tick()
+    assert (talk.state, talk.core.standing.settled) == (State.RETURNING, True)
+
+
+def test_one_that_was_held_and_is_not_heard_when_the_search_is_over_for_all_stays_held() -> None:
+    flight = Flight(flown=True, carried_s=60.0, left_at=990.0)
+    talk = Talk(standing=Standing(state=State.HOLDING), flight=flight, in_control=False)
+    talk.sees(over="found")
+    talk.pass_by(2.0)
+    assert not [row for row in talk.rows if isinstance(row, TransitionRow)]
+    talk.done()
+    talk.pass_by(2.0)
+    assert (talk.state, talk.core.standing.settled) == (State.HOLDING, True)
 
 
 # ---- where it is

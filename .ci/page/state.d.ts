@@ -152,7 +152,7 @@ interface PoseState {
   lon: number;
   written: string;
   height_m: number;
-  heading_deg: number;
+  heading_deg: number | null;
   time: number;
   pitch_deg: number;
   roll_deg: number;

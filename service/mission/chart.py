@@ -61,11 +61,14 @@ class Chart:
         return written(point, self.grid.coordinates)
 
     def heading(self, t: Telemetry) -> str:
-        """Where it goes, in the grid's eight directions; where its nose points while it goes nowhere."""
+        """Where it goes, in the grid's eight directions; where its nose points while it goes nowhere, or that is
+        not known; north while nothing is known."""
         north, east, _ = t.velocity_ned_mps
         heading = t.heading_deg
         if math.hypot(north, east) >= GOES_MPS or not math.isfinite(heading):
             heading = math.degrees(math.atan2(east, north))
+        if not math.isfinite(heading):
+            return DIRECTIONS[0]
         return DIRECTIONS[round(((heading - self.frame.bearing_deg) % 360.0) / 45.0) % 8]
 
     def latlon(self, cell: tuple[float, float]) -> LatLon:

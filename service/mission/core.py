@@ -50,7 +50,7 @@ from service.mission.flight import Flight
 from service.mission.grounded import Grounded
 from service.mission.guard import CRITICAL, guard
 from service.mission.helm import Helm
-from service.mission.limits import Objection
+from service.mission.limits import Objection, no_stop
 from service.mission.logbook import Logbook
 from service.mission.news import (
     Done,
@@ -65,7 +65,7 @@ from service.mission.news import (
     Order,
     Thought,
 )
-from service.mission.orders import concerned, judged, ordered, sensible
+from service.mission.orders import concerned, gives_back, judged, ordered, sensible
 from service.mission.phase import (
     Begin,
     ComeUp,
@@ -92,7 +92,15 @@ from service.mission.phase import (
 )
 from service.mission.reserve import Reserve
 from service.mission.situation import Situation, on_ground
-from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing, Terms, as_asked, may_be_aloft
+from service.mission.standing import (
+    LEAST_PATIENCE_WALL_S,
+    Look,
+    Standing,
+    Terms,
+    as_asked,
+    may_be_aloft,
+    one_more,
+)
 from service.mission.states import (
     FINAL,
     FLYING,
@@ -109,7 +117,6 @@ from service.mission.watch import VehicleWatch
 from service.reasons import Reason
 from service.rows import DecisionRow, ReplacedRow, TransitionRow
 
-HOW = {State.YIELDED: "; Resume gives it back"}
 _BEFORE_FLIGHT = (State.READY, State.TAKEOFF)
 _WARNING = logging.WARNING
 GIVEN_UP_AFTER = 10  # waypoints that the ground forbids
@@ -398,8 +405,7 @@ class MissionCore:
             case Lost():
                 self._phase.lost(self._look())
             case Stay(why=why):
-                if why not in self.standing.why:
-                    self._change(why=f"{self.standing.why}; {why}")
+                self._change(why=one_more(self.standing.why, why))
             case GiveUp(reason=reason):
                 self._emit(Note(reason, logging.ERROR))
                 self._give_up(reason, stop=True, then="hovering")
@@ -462,7 +468,7 @@ class MissionCore:
             self._emit(Note(f"waypoint not sent: {objection.reason}", _WARNING))
         self._kept_from = objection.reason if objection.cause == "apart" else ""
         if self._phase is phase:
-            phase.lost(self._look())
+            phase.refused(objection, self._look())
 
     def _change(self, **fields: object) -> None:
         self.standing = replace(self.standing, **fields)  # type: ignore[arg-type]
@@ -481,7 +487,8 @@ class MissionCore:
         self._enter(before, after, wish)
         self._emit(WriteRow(TransitionRow(before, wish.event, after, wish.reason)))
         self._emit(Note(f"{before} → {after}: {wish.reason}"))
-        self._emit(Tell(f"search {after}: {wish.told or wish.reason}{HOW.get(after, '')}"))
+        how = f"; {gives_back(self._look())}" if after == State.YIELDED else ""
+        self._emit(Tell(f"search {after}: {wish.told or wish.reason}{how}"))
         return True
 
     def _enter(self, before: State, after: State, wish: Happen) -> None:
@@ -515,7 +522,7 @@ class MissionCore:
         if wish.home:
             self._happen(Happen(Event.RETURN, wish.reason, stopped="the autopilot was silent"))
         else:
-            self._happen(Happen(Event.RETURN if self.standing.homeward else Event.RESUME, wish.reason))
+            self._happen(Happen(self.standing.goes_on_by, wish.reason))
 
     def _come_up(self, wish: ComeUp) -> None:
         """What a person wants of an aircraft that is not heard yet is as good as done, whatever a flag says later."""
@@ -553,13 +560,14 @@ class MissionCore:
     # ---- stopping
 
     def _stop(self) -> bool:
-        """Stop here. A stop is a waypoint too: while the position is not trusted, the autopilot brakes by itself."""
+        """Stop here. A stop is a waypoint too: while none can be sent, the autopilot brakes by itself."""
         self._drop_action()
         self._emit(Rest())
         if not self._seen.telemetry.in_control:
             return False
-        doubts = self.helm.doubts(self._seen.telemetry, self._now)
-        self._emit(Brake() if doubts else Stop(self.helm.heights.least_stop_amsl_m(self._seen.telemetry)))
+        t = self._seen.telemetry
+        blind = self.helm.doubts(t, self._now) or no_stop(t)
+        self._emit(Brake() if blind else Stop(self.helm.heights.least_stop_amsl_m(self._seen.telemetry)))
         return True
 
     def _drop_action(self) -> None:

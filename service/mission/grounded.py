@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from service.chances import sure
-from service.mission.departing import Handover, climb
+from service.mission.departing import Handover, Lacks, climb
 from service.mission.effects import Connect, Note, WaitReady
 from service.mission.news import Done, Failed, News
 from service.mission.phase import RETRY_S, Happen, Phase, Stand, Stay, Wish, say
@@ -28,7 +28,7 @@ class Grounded(Phase):
 
     def __init__(self, percent: float | None, *, coming: bool = False) -> None:
         self._percent, self._coming = percent, coming
-        self._handover = Handover(between=True)
+        self._handover, self._lacks = Handover(between=True), Lacks()
         self._told = self._fresh = False
         self._not_before = 0.0
 
@@ -50,6 +50,7 @@ class Grounded(Phase):
                 yield Connect()
         elif on_ground(t):
             yield Stand()
+            yield from self._lacks.tick(look)
             yield from self._look_at_the_battery(look)
         else:
             yield from self._handover.tick(look)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from service.config import Settings
-from service.geometry import LatLon, offset_m
+from service.geometry import LatLon, between, offset_m
 from service.mavlink.events import Target
 from service.mavlink.target import distance_m
 from service.mavlink.telemetry import Telemetry, Wind
@@ -25,6 +25,7 @@ from service.mission.limits import (
     Objection,
     PositionTrust,
     Progress,
+    not_airborne,
     reference_objection,
     wind_objection,
 )
@@ -36,6 +37,7 @@ STRAYED_S = 2.0
 BESIDE_M = 4.0
 """Whose home is nearer to another's may land on who stands there already: GPS is not better."""
 LOW_S = 1.0
+AIRBORNE_S = 2.0  # so long it may not say that it is in the air
 
 
 class Helm:
@@ -54,7 +56,7 @@ class Helm:
         self.trust = PositionTrust(settings.flight, fresh_s)
         near_m = max(settings.flight.corner_m, 0.3 * chart.frame.cell_m)
         self._progress = Progress(patience_s, near_m)
-        self._windy = Lasting(WINDY_S)
+        self._windy, self._aground = Lasting(WINDY_S), Lasting(max(AIRBORNE_S, fresh_s))
         self._strayed, self._straying = Lasting(STRAYED_S), Straying()
         self._low, self._sinking = Lasting(LOW_S), Straying()
         self.heights = Heights(chart, settings)
@@ -177,9 +179,9 @@ class Helm:
 
     def stop_place(self, t: Telemetry) -> LatLon:
         """Where the aircraft comes to a stand, or as near to that as the search may be."""
-        (lat, lon), (lat2, lon2) = here(t), self.stands(t)
+        stands = self.stands(t)
         for share in (1.0, 0.75, 0.5, 0.25):
-            point = lat + share * (lat2 - lat), lon + share * (lon2 - lon)
+            point = between(here(t), stands, share)
             if self.allows(point):
                 return point
         return here(t)
@@ -219,11 +221,13 @@ class Helm:
 
     def trouble(self, t: Telemetry, now: float, *, moving: bool) -> Objection | None:
         """What stands against flying on while the autopilot follows our waypoints, or nothing."""
-        doubts = self.doubts(t, now)
+        doubts, aground = self.doubts(t, now), self._aground.after(not_airborne(t) if moving else "", now)
         if not t.guided:
             return None
         if doubts:
             return Objection("position", "; ".join(doubts))
+        if aground:
+            return Objection("air", aground)
         if moving and self._target is not None:
             stuck = self._progress.stuck(self._chart.distance(here(t), self._target), now)
             return Objection("progress", stuck) if stuck else None

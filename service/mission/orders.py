@@ -35,6 +35,7 @@ STOPPING = ("hold", "return", "home", "finish", "abort", "leave")
 OFFERED = ("hold", "resume", "return", "launch", "replace", "finish")
 """Orders that a page has a button for."""
 _MAY_LAUNCH = (State.READY, State.GROUNDED, State.YIELDED, State.HOLDING)
+_TAKES = ("resume", "return", "launch")  # what takes a yielded aircraft; finish and abort send it nothing
 _BEFOREHAND = ("hold", "return", "finish")  # mean something to an aircraft that is not heard yet
 STICKS = 0.15  # part of their way, from which on deflected sticks are a hand on them
 
@@ -133,6 +134,12 @@ def judged(word: Judged, look: Look) -> Iterator[Wish]:
     """What follows from an operator's word on a place, which the belief knows by now."""
     standing = look.standing
     said = f"the operator {'confirmed' if word.confirmed else 'rejected'} the place"
+    if not word.moves:  # it counts where the search goes on, or ends
+        if not word.confirmed and word.found is None:
+            yield Find(None)
+        yield from warn(f"{said}; the aircraft stays stopped, as was said since", look)
+        yield Answer(word.ticket)
+        return
     if word.confirmed and word.found is not None:
         yield Find(word.found)
         yield from tell(word.found, look, said)
@@ -153,8 +160,9 @@ def _refusal(command: str, look: Look) -> str:
     t = look.seen.telemetry
     if why := _senseless(command, look.standing.state, on_ground(t)):
         return why
-    taken = look.standing.state in (State.YIELDED, State.HOLDING)
-    if command == "resume" and taken and (t.sticks or 0.0) > STICKS:
+    yielded = look.standing.state == State.YIELDED
+    takes = command in _TAKES if yielded else command == "resume" and look.standing.state == State.HOLDING
+    if takes and (t.sticks or 0.0) > STICKS:
         return "the pilot's sticks are not in the middle; the pilot has the aircraft"
     if command == "launch":
         if not look.terms.may_take_off:
@@ -183,3 +191,10 @@ def _ours(look: Look) -> bool:
     """The aircraft is in our hands, and follows our waypoints."""
     t = look.seen.telemetry
     return t.in_control and t.guided and not look.standing.autopilot_returns
+
+
+def gives_back(look: Look) -> str:
+    """What a person does who gives a yielded aircraft back."""
+    if not on_ground(look.seen.telemetry):
+        return "Resume gives it back"
+    return "Launch gives it back" if look.terms.may_take_off else "take off, then Resume gives it back"

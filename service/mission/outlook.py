@@ -60,6 +60,7 @@ class Outlook:
             found=search.found() if looks else None,
             confirmed=search.confirmed is not None,
             suspect_in_view=self._suspect_in_view(),
+            missing=tuple(self.vehicle.missing()) if standing.state in (State.READY, State.GROUNDED) else (),
             others=self.formation.others(search.aircraft),
             over=search.over() if self.formation.several else "",
         )

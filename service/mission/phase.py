@@ -15,6 +15,7 @@ from service.evidence.found import Found
 from service.geometry import Cell, LatLon
 from service.mission.effects import Action, Effect, Note, SendWaypoint, Tell
 from service.mission.heights import CLIMBED_M
+from service.mission.limits import Objection
 from service.mission.news import News, NotSent
 from service.mission.standing import Look
 from service.mission.states import Event
@@ -199,6 +200,10 @@ class Phase:
 
     def lost(self, look: Look) -> None:
         """The last waypoint or stop may not have arrived."""
+
+    def refused(self, objection: Objection, look: Look) -> None:
+        """A waypoint was not sent; the phase goes on."""
+        self.lost(look)
 
 
 def say(said: str, look: Look) -> Iterator[Wish]:

@@ -10,6 +10,7 @@ from service.geometry import LatLon, Metres, offset_m
 from service.mavlink.telemetry import Telemetry, Wind
 from service.mission.chart import Chart, here
 from service.mission.energy import Consumption, Energy, Level, WayHome, cost_per_s
+from service.mission.situation import on_ground
 from service.mission.wind import WindFelt
 
 _MOVED_M = 20.0  # the way home is looked for anew after so many metres
@@ -34,7 +35,7 @@ class Reserve:
     def update(self, t: Telemetry, now: float, *, under_way: bool, waits_s: float = 0.0) -> None:
         """Take in what the vehicle tells now; nothing on the ground, and the battery alone while the position is
         not known. `waits_s`: how long it may have to wait over home for others to land."""
-        if t.landed_state == "on_ground":
+        if on_ground(t):
             return
         if t.battery_percent is not None:
             self._consumption.update(t.battery_percent, now)
@@ -42,6 +43,7 @@ class Reserve:
         percent = self._level.update(t.battery_percent, cost_per_s(rate, self._flight), now)
         if t.position_known and t.landed_state == "in_air":
             self.wind = self._wind.update(t, under_way, now)
+        if t.position_known:  # whatever it says of the ground: what is armed may fly
             home = WayHome.along(self._way(t), t.alt_home_m, self.wind, self._flight, self._return_m)
             home = home.waiting(waits_s)
         level, doubt = percent, self._level.doubt

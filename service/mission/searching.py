@@ -7,6 +7,7 @@ at once; a suspect in view is hovered over where that gives another look.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -230,6 +231,7 @@ class Searching(Phase):
         if not self._thinking and navigator.wants_decision(remaining, thinking_s):
             self._thinking = True
             speed = t.ground_speed_mps if navigator.interrupted else navigator.speed_mps
+            speed = speed if math.isfinite(speed) else 0.0  # not told: as one that stands
             left = look.battery_left()
             left = None if left is None else left.after(remaining / look.settings.flight.speed_mps)
             yield Think(navigator.waypoint, navigator.heading, navigator.ahead, speed, left)

@@ -15,6 +15,14 @@ from service.mission.states import FLYING, Event, State
 
 LEAST_PATIENCE_WALL_S = 1.5
 
+_FIRST, _LAST = 200, 300  # characters of a reason that has become too long
+
+
+def one_more(why: str, more: str) -> str:
+    """A reason with one more, unless it has that: what came first and what came last, however many there were."""
+    said = why if more in why else f"{why}; {more}"
+    return said if len(said) <= _FIRST + _LAST else f"{said[:_FIRST]} ... {said[-_LAST:]}"
+
 
 @dataclass(frozen=True, slots=True)
 class Standing:
@@ -59,6 +67,14 @@ class Standing:
     def goes_home_by_itself(self) -> bool:
         """The autopilot has been told to, or is about to be: which needs neither our waypoints nor our journal."""
         return self.state == State.RETURNING and (self.direct or self.autopilot_returns)
+
+    @property
+    def goes_on_by(self) -> Event:
+        """What ends a hold that no person has ordered: it goes on with what it did."""
+        if self.homeward:
+            return Event.RETURN
+        found = self.settled and self.found is not None  # and not one that the search went on after
+        return Event.CONFIRMED if found else Event.RESUME
 
     @property
     def flying(self) -> bool:

@@ -349,7 +349,7 @@ export class Chart {
     this.craft
       .getElement()
       .querySelector("g")
-      .setAttribute("transform", `rotate(${pose.heading_deg})`);
+      .setAttribute("transform", `rotate(${pose.heading_deg ?? 0})`);
   }
 
   /** @param {FootprintState} footprint */

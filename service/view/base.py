@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import replace
 from functools import partial
 from typing import cast
 
@@ -14,7 +15,7 @@ from service.area import SearchArea
 from service.chances import share
 from service.config import Settings, each_aircraft
 from service.evidence.found import Found
-from service.evidence.observe import FramePose
+from service.evidence.observe import FramePose, finite_or_level
 from service.evidence.sensors import Profile
 from service.geometry import LatLon
 from service.mission.states import State
@@ -146,6 +147,7 @@ class BaseView:
         }  # fmt: skip
         if pose is None:
             return shown
+        pose = replace(pose, heading_deg=finite_or_level(pose.heading_deg))  # drawn all the same
         footprint, frame = self.sensors[whose].footprint(pose), self.search.grid.frame
         corners = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
         worth = (footprint.counts, footprint.covered, footprint.p_tp, footprint.p_tn)

@@ -17,7 +17,6 @@ from service.evidence.counts import Counts
 from service.evidence.cover import sensors_over
 from service.evidence.found import Found
 from service.evidence.images import Images
-from service.evidence.observe import finite_or_level
 from service.geometry import LatLon
 from service.known import Known
 from service.mavlink.modes import mode_title
@@ -31,7 +30,7 @@ from service.view.base import BaseView, news_states, sortie_states
 from service.view.curve import PosCurve
 from service.view.feed import Moment
 from service.view.next import STATE_WORDS
-from service.view.state import AircraftState, RunState, option_states, pose_state, reports_state
+from service.view.state import AircraftState, RunState, known_deg, option_states, pose_state, reports_state
 
 KEPT = 32  # copies of the belief along the run, to go back to
 AFTER_RESTART_S = 0.1
@@ -191,7 +190,7 @@ class ReplayView(BaseView):
             "lat": pose.lat if pose else None,
             "lon": pose.lon if pose else None,
             "height": pose.height_m if pose else None,
-            "heading_deg": finite_or_level(pose.heading_deg) if pose else None,
+            "heading_deg": known_deg(pose.heading_deg) if pose else None,
             "battery": None,
             "link": None,
             "mode": flight.mode and mode_title(flight.mode),

@@ -14,7 +14,7 @@ from typing_extensions import TypedDict  # what pydantic can read on Python 3.11
 
 from service.evidence.counts import Counts
 from service.evidence.found import Found, Suspect
-from service.evidence.observe import FramePose, finite_or_level
+from service.evidence.observe import FramePose
 from service.geometry import LatLon
 from service.mission.states import State
 from service.places import Coordinates, written
@@ -55,13 +55,14 @@ class SuspectState(Suspect):
 
 
 class PoseState(TypedDict):
-    """Where the aircraft is: degrees, metres above launch, seconds; its nose from true north, up, right wing down."""
+    """Where the aircraft is: degrees, metres above launch, seconds; its nose from true north (null: not known), up,
+    right wing down."""
 
     lat: float
     lon: float
     written: str
     height_m: float
-    heading_deg: float
+    heading_deg: float | None
     time: float
     pitch_deg: float
     roll_deg: float
@@ -297,6 +298,11 @@ def suspect_states(suspects: Sequence[Suspect], how: Coordinates) -> list[Suspec
     return [{**each, "written": written((each["lat"], each["lon"]), how)} for each in suspects]
 
 
+def known_deg(angle: float) -> float | None:
+    """An angle as it is told; None while it is not known."""
+    return angle if math.isfinite(angle) else None
+
+
 def pose_state(pose: FramePose | None, how: Coordinates) -> PoseState | None:
     """A pose as it is told."""
     if pose is None:
@@ -306,7 +312,7 @@ def pose_state(pose: FramePose | None, how: Coordinates) -> PoseState | None:
         "lon": pose.lon,
         "written": written((pose.lat, pose.lon), how),
         "height_m": pose.height_m,
-        "heading_deg": finite_or_level(pose.heading_deg),
+        "heading_deg": known_deg(pose.heading_deg),
         "time": pose.time,
         "pitch_deg": pose.pitch_deg,
         "roll_deg": pose.roll_deg,

@@ -58,9 +58,9 @@ _LIES: tuple[
     tuple[str, str, float, int], ...
 ] = (  # message, field, value, how often (0: as long as it lasts)
     ("GLOBAL_POSITION_INT", "hdg", 65535, 0),
+    ("GLOBAL_POSITION_INT", "vx", 32767, 0),
     ("GLOBAL_POSITION_INT", "time_boot_ms", 4294967295, 1),
     ("GLOBAL_POSITION_INT", "lat", 2147483647, 1),
-    ("GLOBAL_POSITION_INT", "vx", 32767, 0),
     ("SYS_STATUS", "battery_remaining", -1, 0),
     ("ATTITUDE", "yaw", float("nan"), 0),
     ("ATTITUDE", "time_boot_ms", 4294967295, 1),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,12 +20,12 @@ from service.mission.flight import Flight
 from service.mission.states import State
 from service.search import Search
 from service.survey import AREA, survey
-from service.view.live import RunView, flight_left_s
+from service.view.live import RunView, flight_left_s, pose_of
 from service.view.replay import ReplayView
-from service.view.state import RunState
+from service.view.state import RunState, pose_state
 from tests.service.export.recorded import SETTINGS, record
 from tests.service.http.door import FakeRun
-from tests.service.mission.flown import START, reached
+from tests.service.mission.flown import START, reached, telemetry
 
 KNOWN_LIVE_ALONE = {"flight_left_s", "battery_percent", "battery_doubt", "link", "detector", "wind"}
 """What a journal does not keep."""
@@ -80,6 +81,14 @@ def test_steps_are_cells_flown_in_a_replay_too(tmp_path: Path) -> None:
     assert view.state()["steps"] > 0  # though its planner has journalled no decision
     assert view.decisions(10) == []
     assert view.state()["steps"] < len(flown)
+
+
+@pytest.mark.parametrize("heading", [0.0, 350.0, math.nan])
+def test_a_heading_that_is_not_known_is_told_as_that_and_not_as_north(heading: float) -> None:
+    flying: Any = SimpleNamespace(vehicle=SimpleNamespace(telemetry=telemetry(heading_deg=heading)))
+    pose = pose_state(pose_of(flying), "degrees")
+    assert pose is not None
+    assert pose["heading_deg"] == (None if math.isnan(heading) else heading)
 
 
 def test_the_time_left_is_that_of_this_sortie_by_the_aircrafts_own_settings() -> None:

@@ -73,12 +73,14 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the service or one of its commands; returns the exit code."""
     from service.errors import BadInput
+    from service.outlet import nobody_waits
 
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         if words and not words[0].startswith("-"):
             return _command(words[0], words[1:])
-        return _search(words)
+        with nobody_waits():
+            return _search(words)
     except BadInput as error:
         print(f"{NAME}: {error}", file=sys.stderr)
         return 2

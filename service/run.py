@@ -34,6 +34,7 @@ from service.journal import Journal
 from service.lockstep import Lockstep
 from service.mavlink import LinkError, MavlinkSettings, Vehicle, check_link, read_signing_key
 from service.mission.states import FINAL, State
+from service.outlet import whatever_the_terminal_does
 from service.progress import set_up_logging, show
 from service.provenance import note_beginning, note_resumption
 from service.report import REPORT, found_after_s, run_report, simulated, write_results
@@ -154,7 +155,8 @@ def _ready(prepared: Prepared) -> list[Search]:
 
 
 def _fly(prepared: Prepared, searches: list[Search], folder: Path, journal: Journal) -> int:
-    return asyncio.run(Service(prepared, searches, folder).fly(journal))
+    with whatever_the_terminal_does():
+        return asyncio.run(Service(prepared, searches, folder).fly(journal))
 
 
 def searches_of(prepared: Prepared) -> list[Search]:

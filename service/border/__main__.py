@@ -22,6 +22,7 @@ from service.border.channel import Channel
 from service.border.distant import DistantRun
 from service.border.hello import Hello
 from service.border.memory import SharedMap
+from service.outlet import OF_A_TERMINAL, nobody_waits
 from service.telling import Telling
 
 BEAT_S = 1.0
@@ -107,12 +108,13 @@ def main() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     with contextlib.suppress(OSError):  # where a sandbox does not let us, the kernel's shares are equal
         os.nice(_NICENESS)
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, *OF_A_TERMINAL):
         signal.signal(number, signal.SIG_IGN)
     end = socket.socket(fileno=int(sys.argv[1]))
     hello = Hello.read(int(sys.argv[2]))
     if os.getppid() == parent:  # else it died before the kernel knew that we go with it
-        asyncio.run(serve(end, hello))
+        with nobody_waits():
+            asyncio.run(serve(end, hello))
 
 
 if __name__ == "__main__":

@@ -67,13 +67,15 @@ class Intake:
         *,
         believed: Callable[[float], None] = lambda seconds: None,
         passes: Passes | None = None,
+        placed: Callable[[], bool] = lambda: True,
     ) -> None:
-        """`moments` tells when a frame was taken, `pose_at` looks that up in the telemetry; `told` is called after each
-        applied observation with the time (perf_counter) at which its report arrived, `believed` after each report with
-        the seconds that it took."""
+        """`moments` tells when a frame was taken, `pose_at` looks it up in the telemetry, and `placed` whether it has
+        told any position so far; `told` is called after each applied observation with the time (perf_counter) at which
+        its report arrived, `believed` after each report with the seconds that it took."""
         self.search, self.sensor, self.journal = search, sensor, journal
         self.moments, self.pose_at, self.told, self.believed = moments, pose_at, told, believed
         self.passes = Passes() if passes is None else passes
+        self.placed = placed
         self.counts = Counts()
         self._ids: OrderedDict[str, None] = OrderedDict()
         self._waiting: list[WaitingReport] = []
@@ -368,12 +370,12 @@ class Intake:
     def _pose(self, report: Report, captured: float) -> FramePose:
         """Where the frame was taken: as the report says, else as the telemetry of that time; raises Unreadable."""
         own, known = report.pose, self.pose_at(captured)
+        if known is None and (own is None or self.placed()):  # what cannot be compared is not believed either
+            raise Unreadable(
+                f"no position of the aircraft is known and trusted for captured_at {report.captured_at:.3f}"
+            )
         if own is None:
-            if known is None:
-                raise Unreadable(
-                    "no position of the aircraft is known and trusted for "
-                    f"captured_at {report.captured_at:.3f}"
-                )
+            assert known is not None
             return known
         if known is not None:
             check_pose(own, known)

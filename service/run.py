@@ -49,6 +49,8 @@ from service.view.live import RunView
 log = logging.getLogger("roisearch")
 TOLD_POS = (0.5, 0.75, 0.9)
 """The report tells how long it took to these."""
+BEGUN_AGAIN = 1
+"""Exit code, that of a crash, which lets a service manager start it again: a flight was left to its autopilot."""
 EXIT_CODES = {"found": 0, "probable": 3, "not_found": 3, "aborted": 4}
 
 
@@ -56,7 +58,8 @@ EXIT_CODES = {"found": 0, "probable": 3, "not_found": 3, "aborted": 4}
 class Prepared:
     """All that has to be right before anything starts: the ground, the sensor, the addresses, the key.
 
-    `restarted`: it may be that no person started this, so that only an order takes off.
+    `restarted`: it may be that no person started this, so that only an order takes off. `patient`: nor that there is
+    one to start it again, and an aircraft may be in the air, so that its link is waited for.
     """
 
     area: SearchArea
@@ -64,6 +67,7 @@ class Prepared:
     sensors: Mapping[str, Profile]
     settings: Settings
     restarted: bool
+    patient: bool
     door: Door
     doors: Doors
     signing_key: bytes | None
@@ -73,7 +77,7 @@ class Prepared:
 
 def run(area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool = False) -> int:
     """Run a search from its area file to the ground; returns the exit code. Raises BadInput before it starts."""
-    with _prepared(area_file, prior_file, settings, restarted=restarted) as prepared:
+    with _prepared(area_file, prior_file, settings, restarted=restarted, patient=False) as prepared:
         folder = _new_folder(Path(settings.run.folder), prepared.area.name)
         keep_area(area_file, folder, settings)
         if prior_file is not None:
@@ -103,7 +107,7 @@ def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) ->
     prior_file = folder / PRIOR
     prior = prior_file if prior_file.exists() else None
     with (
-        _prepared(folder / AREA, prior, settings, restarted=restarted) as prepared,
+        _prepared(folder / AREA, prior, settings, restarted=restarted, patient=restarted) as prepared,
         contextlib.closing(Journal(folder / JOURNAL)) as journal,
     ):
         if journal.meta("grid") != prepared.grid.frame.to_dict():
@@ -116,7 +120,7 @@ def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) ->
 
 @contextlib.contextmanager
 def _prepared(
-    area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool
+    area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool, patient: bool
 ) -> Iterator[Prepared]:
     """Read everything and take every address before anything starts, and give these up at the end; raises BadInput."""
     console = Console()
@@ -127,7 +131,7 @@ def _prepared(
         links: dict[str, str] = {}
         for name, alone in each_aircraft(settings).items():
             with about(name):
-                link = str(check_link(alone.link.connect))
+                link = str(check_link(alone.link.connect, patient=patient))
             if links.setdefault(link, name) != name:
                 raise BadInput(
                     f"aircraft '{links[link]}' and '{name}' both have the link {link}; each needs its own"
@@ -139,7 +143,9 @@ def _prepared(
         contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door,
         contextlib.closing(open_doors(settings.doors)) as doors,
     ):
-        yield Prepared(area, grid, sensors, settings, restarted, door, doors, signing_key, console, telling)
+        yield Prepared(
+            area, grid, sensors, settings, restarted, patient, door, doors, signing_key, console, telling
+        )
 
 
 def _ready(prepared: Prepared) -> list[Search]:
@@ -293,7 +299,7 @@ class Service:
             if self.world is not None:
                 await self.world.stop()
         if self.view.squad is None:
-            return EXIT_CODES["aborted"]
+            return BEGUN_AGAIN if self.prepared.patient else EXIT_CODES["aborted"]
         return self._leave_results(self.view.squad, began)
 
     def _leave_results(self, squad: Squad, began: float) -> int:
@@ -325,6 +331,7 @@ class Service:
             allow_arming=self.settings.mock or self.settings.flight.takeoff,
             link_lost_s=link.silent_after_s,
             arming_patience_s=link.connect_timeout_s,
+            wait_for_ever=self.prepared.patient,
             read_return_height=self.search.grid.relief is not None,
             read_motion=True,
             signing_key=self.prepared.signing_key,

@@ -12,9 +12,12 @@ to before it and takes everything in again.
 from __future__ import annotations
 
 import copy
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roisearch import Belief
 from roisearch.detection import DetectionRecord
@@ -30,6 +33,8 @@ from service.news.bearing import FieldNews
 
 KEPT_EVERY_S, MOST_KEPT = 30.0, 3
 """How far apart earlier states are kept, in the time of the search, for reports that come late; and how many."""
+MOST_LOG_ODDS, SUREST_LOG_ODDS = 500.0, 30.0
+"""The most that clues can do between two cells, and to the target's being outside: numbers hold these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +78,9 @@ class Known:
 
     def _begin(self) -> None:
         """As it was before anything was seen, with the clues that stand."""
-        grid, prior, outside = self._grid, self._grid.prior, self._grid.outside
-        for news in self.news:
-            if news.role == "clue":
-                prior = prior.copy()
-                prior[news.cells[:, 0], news.cells[:, 1]] *= news.values
-        if prior is not grid.prior:
-            mass = (1.0 - grid.outside) * float(prior.sum()) / float(grid.prior.sum())
-            outside = grid.outside / (grid.outside + mass)
+        grid = self._grid
+        clues = [news for news in self.news if news.role == "clue"]
+        prior, outside = _with_clues(grid, clues) if clues else (grid.prior, grid.outside)
         self.time: float | None = None
         """Of the last word, seconds since the epoch; None before the first, and wherever the target stands still."""
         self.belief = Belief(prior, searchable=grid.searchable, outside=outside, walk=grid.walk)
@@ -209,3 +209,23 @@ class Known:
         twin.belief = self.belief.copy()
         twin.record, twin.sightings, twin.alarms = copy.deepcopy((self.record, self.sightings, self.alarms))
         return twin
+
+
+def _with_clues(grid: Grid, clues: Sequence[FieldNews]) -> tuple[NDArray[np.float64], float]:
+    """The prior of a grid, [rows, cols], and the probability outside, with the factors of clues.
+
+    In logarithms: a hundred clues of a thousand each are more than a number can hold. What all of them together can do
+    is bounded, so that nothing that was possible becomes impossible.
+    """
+    with np.errstate(divide="ignore"):
+        logs = np.log(grid.prior)
+        for news in clues:
+            logs[news.cells[:, 0], news.cells[:, 1]] += np.log(news.values)
+    peak = float(logs.max())
+    prior = np.where(grid.prior > 0.0, np.exp(np.maximum(logs - peak, -MOST_LOG_ODDS)), 0.0)
+    if grid.outside == 0.0:
+        return prior, 0.0
+    within = (
+        math.log(float(prior.sum()) / float(grid.prior.sum()) * (1.0 - grid.outside) / grid.outside) + peak
+    )
+    return prior, 1.0 / (1.0 + math.exp(min(max(within, -SUREST_LOG_ODDS), MOST_LOG_ODDS)))

@@ -47,6 +47,8 @@ from service.timebase import clock_for
 from service.view.live import RunView
 
 log = logging.getLogger("roisearch")
+MOST_OF_A_NAME = 100
+"""Characters of an area's name in that of its run's folder, which a file system bounds."""
 TOLD_POS = (0.5, 0.75, 0.9)
 """The report tells how long it took to these."""
 BEGUN_AGAIN = 1
@@ -223,7 +225,7 @@ def _signing_key(settings: Settings) -> bytes | None:
 
 
 def _new_folder(parent: Path, name: str) -> Path:
-    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "area"
+    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:MOST_OF_A_NAME] or "area"
     stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
     try:
         for number in range(100):

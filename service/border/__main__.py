@@ -15,6 +15,7 @@ import os
 import signal
 import socket
 import sys
+from pathlib import Path
 from typing import Any
 
 from service.border.asking import Asking
@@ -29,6 +30,8 @@ BEAT_S = 1.0
 _MOST_UNSENT = 1 << 16
 _PR_SET_PDEATHSIG = 1
 _NICENESS = 5  # the flight has three times our share of a busy core
+_OOM, _ENDED_FIRST = Path("/proc/self/oom_score_adj"), 500
+"""Where memory runs out, the kernel ends this process, which is started again, and not the flight."""
 _MOST_CHARACTERS = 4000
 
 
@@ -108,6 +111,8 @@ def main() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     with contextlib.suppress(OSError):  # where a sandbox does not let us, the kernel's shares are equal
         os.nice(_NICENESS)
+    with contextlib.suppress(OSError):
+        _OOM.write_text(str(_ENDED_FIRST))
     for number in (signal.SIGINT, signal.SIGTERM, *OF_A_TERMINAL):
         signal.signal(number, signal.SIG_IGN)
     end = socket.socket(fileno=int(sys.argv[1]))

@@ -57,6 +57,7 @@ def test_systemd_rates_the_sandbox_as_closed(tmp_path: Path) -> None:
         ("CapabilityBoundingSet", ""),
         ("Restart", "on-failure"),
         ("StartLimitIntervalSec", "0"),
+        ("OOMPolicy", "continue"),
     ],
 )
 def test_the_sandbox_has_its_walls(key: str, value: str) -> None:

@@ -218,6 +218,18 @@ def test_the_doors_stay_open_on_the_way_home(tmp_path: Path) -> None:
     asyncio.run(talk())
 
 
+def test_where_memory_runs_out_the_doors_go_first(tmp_path: Path) -> None:
+    def chance(process: int | str) -> int:
+        return int(Path(f"/proc/{process}/oom_score_adj").read_text())
+
+    async def talk() -> int:
+        async with behind_a_door(Flown(), tmp_path):
+            (process,) = await children()
+            return chance(process)
+
+    assert asyncio.run(talk()) >= chance("self") + 400
+
+
 def test_a_flight_that_does_not_answer_is_told_and_does_not_look_healthy(tmp_path: Path) -> None:
     run = Flown()
 

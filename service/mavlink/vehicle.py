@@ -47,6 +47,7 @@ _ARM_AGAIN_S = 2.0
 _LATELY_S = 10.0
 _CLIMB_START_S = 20.0
 _CLIMB_MPS = 0.7
+_CLOCKS_APART_S = 60.0
 _SEVERITY_INFO = 6
 _SEVERITY_WARNING = 4
 
@@ -172,6 +173,13 @@ class Vehicle:
             )
         if core.rejected:
             return f"the only autopilot heard on {where} cannot be flown: {core.rejected}"
+        signer = core.codec.signer
+        if signer is not None and signer.behind_s > _CLOCKS_APART_S and not core.messages_received:
+            return (
+                f"MAVLink is heard on {where}, signed with our key at a time that is {signer.behind_s:.0f} s behind "
+                f"ours: our clock is wrong, or was, as {self.settings.signing_timestamp_file} keeps; set it, and delete that "
+                "file if the vehicle has not heard of that time"
+            )
         if core.codec.refused and not core.messages_received:
             return (
                 f"MAVLink is heard on {where}, but not signed with our key ({core.codec.refused} frames refused); "

@@ -177,8 +177,8 @@ class Vehicle:
         if signer is not None and signer.behind_s > _CLOCKS_APART_S and not core.messages_received:
             return (
                 f"MAVLink is heard on {where}, signed with our key at a time that is {signer.behind_s:.0f} s behind "
-                f"ours: our clock is wrong, or was, as {self.settings.signing_timestamp_file} keeps; set it, and delete "
-                "that file if the vehicle has not heard of that time"
+                f"ours: our clock is wrong, or was, as {self.settings.signing_timestamp_file} has it; set it, delete "
+                "that file"
             )
         if core.codec.refused and not core.messages_received:
             return (

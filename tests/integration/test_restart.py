@@ -52,7 +52,8 @@ def the_run(scene: Scene) -> str:
     return str(folder)
 
 
-@pytest.mark.parametrize(("person", "flavor"), [("pilot", "px4"), ("operator", "ardupilot")])
+@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
+@pytest.mark.parametrize("person", ["pilot", "operator"])
 def test_what_a_person_stopped_stays_stopped_across_a_kill(flavor: str, person: str, tmp_path: Path) -> None:
     with flight(tmp_path, flavor, speedup=SPEEDUP) as scene:
         scene.searching()

@@ -93,6 +93,7 @@ def assemble(
             believed=view.believed.observe,
             passes=Passes(again_s=settings.sensor.hover_look_s or math.inf),
         )
+        intake.placed = lambda: len(vehicle.history) > 0
         remembered.tell(intake)
         return intake
 

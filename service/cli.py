@@ -73,12 +73,14 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the service or one of its commands; returns the exit code."""
     from service.errors import BadInput
+    from service.outlet import nobody_waits
 
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         if words and not words[0].startswith("-"):
             return _command(words[0], words[1:])
-        return _search(words)
+        with nobody_waits():
+            return _search(words)
     except BadInput as error:
         print(f"{NAME}: {error}", file=sys.stderr)
         return 2
@@ -145,7 +147,9 @@ def _search(words: list[str]) -> int:
     }
     from service.config import read_settings
     from service.run import interrupted, resume, run
+    from service.unpacking import given_again, unpack
 
+    again = {**given_again(os.environ), **{key: value for key, value in flags.items() if value is not None}}
     if options.resume is not None:
         packed = options.resume.is_file()
         for name in ("prior", "config") if packed else ("prior", "config", "runs"):
@@ -153,13 +157,10 @@ def _search(words: list[str]) -> int:
                 raise BadInput(
                     f"--{name} does nothing with --resume: a run goes on with what is in its folder; leave it out"
                 )
-        from service.packing import given_again, unpack
-
-        flags |= given_again(os.environ)
         if packed:
-            return resume(unpack(options.resume, Path(options.runs or "runs")), flags)
-        return resume(options.resume, flags)
+            return resume(unpack(options.resume, Path(options.runs or "runs"), again), again)
+        return resume(options.resume, again)
     settings = read_settings(options.config, flags=flags)
     if options.go_on and (folder := interrupted(options.area, settings)) is not None:
-        return resume(folder, flags, restarted=True)
+        return resume(folder, again, restarted=True)
     return run(options.area, options.prior, settings, restarted=options.go_on)

@@ -12,6 +12,8 @@ to before it and takes everything in again.
 from __future__ import annotations
 
 import copy
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +33,8 @@ from service.news.bearing import FieldNews
 
 KEPT_EVERY_S, MOST_KEPT = 30.0, 3
 """How far apart earlier states are kept, in the time of the search, for reports that come late; and how many."""
+MOST_LOG_ODDS, SUREST_LOG_ODDS = 500.0, 30.0
+"""The most that clues can do between two cells, and to the target's being outside: numbers hold these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,15 +83,9 @@ class Known:
 
     def _begin(self) -> None:
         """As it was before anything was seen, with the clues that stand."""
-        grid, outside = self._grid, self._grid.outside
-        prior = assumed = self._assumed()
-        for news in self.news:
-            if news.role == "clue":
-                prior = prior.copy()
-                prior[news.cells[:, 0], news.cells[:, 1]] *= news.values
-        if prior is not assumed:
-            mass = (1.0 - grid.outside) * float(prior.sum()) / float(assumed.sum())
-            outside = grid.outside / (grid.outside + mass)
+        grid, assumed = self._grid, self._assumed()
+        clues = [news for news in self.news if news.role == "clue"]
+        prior, outside = _with_clues(assumed, grid.outside, clues) if clues else (assumed, grid.outside)
         self.time: float | None = None
         """Of the last word, seconds since the epoch; None before the first, and wherever the target stands still."""
         self.belief = Belief(prior, searchable=grid.searchable, outside=outside, walk=grid.walk)
@@ -233,3 +231,21 @@ class Known:
         twin.belief = self.belief.copy()
         twin.record, twin.sightings, twin.alarms = copy.deepcopy((self.record, self.sightings, self.alarms))
         return twin
+
+
+def _with_clues(assumed: FloatArray, outside: float, clues: Sequence[FieldNews]) -> tuple[FloatArray, float]:
+    """A prior, float [rows, cols], and the probability outside, with the factors of clues.
+
+    In logarithms: a hundred clues of a thousand each are more than a number can hold. What all of them together can do
+    is bounded, so that nothing that was possible becomes impossible.
+    """
+    with np.errstate(divide="ignore"):
+        logs = np.log(assumed)
+        for news in clues:
+            logs[news.cells[:, 0], news.cells[:, 1]] += np.log(news.values)
+    peak = float(logs.max())
+    prior = np.where(assumed > 0.0, np.exp(np.maximum(logs - peak, -MOST_LOG_ODDS)), 0.0)
+    if outside == 0.0:
+        return prior, 0.0
+    within = math.log(float(prior.sum()) / float(assumed.sum()) * (1.0 - outside) / outside) + peak
+    return prior, 1.0 / (1.0 + math.exp(min(max(within, -SUREST_LOG_ODDS), MOST_LOG_ODDS)))

@@ -3,25 +3,23 @@
 The journal is copied as SQLite copies a database that may be in use, so that no row is left in a `-wal` file. Files
 that the settings name (a detector's calibration, a terrain) come along and are named anew where they are unpacked; so
 do the pictures that came with reports, and the area file as it was given.
-Files with keys and tokens stay where they are, and so must be given again.
+Files with keys and tokens stay where they are, and so must be given again; `service.unpacking` says what else.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
-import shutil
 import sqlite3
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from service.config import variable_name
 from service.errors import BadInput
 from service.evidence.images import FOLDER as PICTURES
-from service.journal import Journal, read_meta, read_rows
+from service.journal import read_meta, read_rows
 from service.provenance import SECRET
 from service.survey import AREA, GIVEN, JOURNAL, PRIOR
 
@@ -34,7 +32,6 @@ CARRIED = (
 """Settings that name a file which travels, by section and key; each aircraft's calibration does, too."""
 LEFT_OUT = (*SECRET, ("telling", "tak_ca_file"), ("page", "mbtiles_file"))
 """Settings that do not travel: secrets, and what names a file that does not."""
-MOST_BYTES = 20_000_000_000
 
 
 def pack(folder: Path, out: Path) -> int:
@@ -50,7 +47,7 @@ def pack(folder: Path, out: Path) -> int:
         files[PRIOR] = folder / PRIOR
     files |= {given.name: given for given in folder.glob(f"{GIVEN}.*")}
     files |= {f"{PICTURES}/{file.name}": file for file in (folder / PICTURES).glob("*.jpg")}
-    for table, key in _carried(settings):
+    for table, key in carried(settings):
         given = Path(table[key])
         name = given.name  # some formats are told by their name
         if name in files or name == JOURNAL:
@@ -86,13 +83,7 @@ def left_out(settings: dict[str, Any]) -> list[tuple[str, str]]:
     return [(section, key) for section, key in LEFT_OUT if settings.get(section, {}).get(key)]
 
 
-def given_again(environment: Mapping[str, str]) -> dict[str, str]:
-    """What does not travel and is told anew, by ROISEARCH_SECTION_KEY variables: 'section.key' to its value."""
-    names = {f"{section}.{key}": variable_name(f"{section}.{key}") for section, key in LEFT_OUT}
-    return {key: environment[name] for key, name in names.items() if name in environment}
-
-
-def _carried(settings: dict[str, Any]) -> Iterator[tuple[Any, Any]]:
+def carried(settings: dict[str, Any]) -> Iterator[tuple[Any, Any]]:
     """Where the settings name a file that travels: the table or list, and the key or index in it."""
     for section, key in CARRIED:
         if settings.get(section, {}).get(key):
@@ -104,38 +95,6 @@ def _carried(settings: dict[str, Any]) -> Iterator[tuple[Any, Any]]:
     yield from ((files, i) for i in range(len(files)))
 
 
-def unpack(file: Path, parent: Path) -> Path:
-    """The folder under `parent` that a packed run now lies in, ready to be gone on with.
-
-    Raises BadInput: the file is no packed run, or is damaged, or its folder is there already.
-    """
-    folder = parent / file.stem
-    try:
-        with zipfile.ZipFile(file) as packed:
-            sizes = {item.filename: item.file_size for item in packed.infolist()}
-            if not {AREA, JOURNAL} <= set(sizes) or sum(sizes.values()) > MOST_BYTES:
-                raise BadInput(f"{file}: is no packed run; make one with roisearch-service pack RUN")
-            folder.mkdir(parents=True)
-            try:
-                for name in sizes:
-                    picture = name.startswith(f"{PICTURES}/") and name.count("/") == 1
-                    if Path(name).name == name or picture:  # nothing is put elsewhere
-                        packed.extract(name, folder)
-                _settle(folder)
-            except BaseException:
-                shutil.rmtree(folder, ignore_errors=True)
-                raise
-    except FileExistsError:
-        raise BadInput(f"{folder}: is there already; go on with it, or move it away") from None
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, EOFError, ValueError) as error:
-        if isinstance(error, BadInput):
-            raise
-        raise BadInput(f"{file}: is no packed run, or is damaged ({error}); copy it again") from error
-    except OSError as error:
-        raise BadInput(f"{error.filename or file}: {error.strerror}; give a writable --runs") from error
-    return folder
-
-
 def _copy(journal: Path, copy: Path, settings: dict[str, Any]) -> None:
     with (
         contextlib.closing(sqlite3.connect(f"{journal.resolve().as_uri()}?mode=ro", uri=True)) as source,
@@ -145,12 +104,3 @@ def _copy(journal: Path, copy: Path, settings: dict[str, Any]) -> None:
         target.execute("PRAGMA journal_mode=DELETE")  # one file
         target.execute("UPDATE meta SET value = ? WHERE key = 'settings'", (json.dumps(settings),))
         target.commit()
-
-
-def _settle(folder: Path) -> None:
-    """Name the files where they lie now, and see that the journal is whole; its mark begins here."""
-    with contextlib.closing(Journal(folder / JOURNAL)) as journal:
-        settings = journal.meta("settings")
-        for table, key in _carried(settings):
-            table[key] = str((folder / Path(table[key]).name).resolve())
-        journal.set_meta("settings", settings)

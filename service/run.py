@@ -34,6 +34,7 @@ from service.journal import Journal
 from service.lockstep import Lockstep
 from service.mavlink import LinkError, MavlinkSettings, Vehicle, check_link, read_signing_key
 from service.mission.states import FINAL, State
+from service.outlet import whatever_the_terminal_does
 from service.progress import set_up_logging, show
 from service.provenance import note_beginning, note_resumption
 from service.report import REPORT, found_after_s, run_report, simulated, write_results
@@ -46,8 +47,12 @@ from service.timebase import clock_for
 from service.view.live import RunView
 
 log = logging.getLogger("roisearch")
+MOST_OF_A_NAME = 100
+"""Characters of an area's name in that of its run's folder, which a file system bounds."""
 TOLD_POS = (0.5, 0.75, 0.9)
 """The report tells how long it took to these."""
+BEGUN_AGAIN = 1
+"""Exit code, that of a crash, which lets a service manager start it again: a flight was left to its autopilot."""
 EXIT_CODES = {"found": 0, "probable": 3, "not_found": 3, "aborted": 4}
 
 
@@ -55,7 +60,8 @@ EXIT_CODES = {"found": 0, "probable": 3, "not_found": 3, "aborted": 4}
 class Prepared:
     """All that has to be right before anything starts: the ground, the sensor, the addresses, the key.
 
-    `restarted`: it may be that no person started this, so that only an order takes off.
+    `restarted`: it may be that no person started this, so that only an order takes off. `patient`: nor that there is
+    one to start it again, and an aircraft may be in the air, so that its link is waited for.
     """
 
     area: SearchArea
@@ -63,6 +69,7 @@ class Prepared:
     sensors: Mapping[str, Profile]
     settings: Settings
     restarted: bool
+    patient: bool
     door: Door
     doors: Doors
     signing_key: bytes | None
@@ -72,7 +79,7 @@ class Prepared:
 
 def run(area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool = False) -> int:
     """Run a search from its area file to the ground; returns the exit code. Raises BadInput before it starts."""
-    with _prepared(area_file, prior_file, settings, restarted=restarted) as prepared:
+    with _prepared(area_file, prior_file, settings, restarted=restarted, patient=False) as prepared:
         folder = _new_folder(Path(settings.run.folder), prepared.area.name)
         keep_area(area_file, folder, settings)
         if prior_file is not None:
@@ -102,7 +109,7 @@ def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) ->
     prior_file = folder / PRIOR
     prior = prior_file if prior_file.exists() else None
     with (
-        _prepared(folder / AREA, prior, settings, restarted=restarted) as prepared,
+        _prepared(folder / AREA, prior, settings, restarted=restarted, patient=restarted) as prepared,
         contextlib.closing(Journal(folder / JOURNAL)) as journal,
     ):
         if journal.meta("grid") != prepared.grid.frame.to_dict():
@@ -115,7 +122,7 @@ def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) ->
 
 @contextlib.contextmanager
 def _prepared(
-    area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool
+    area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool, patient: bool
 ) -> Iterator[Prepared]:
     """Read everything and take every address before anything starts, and give these up at the end; raises BadInput."""
     console = Console()
@@ -126,7 +133,7 @@ def _prepared(
         links: dict[str, str] = {}
         for name, alone in each_aircraft(settings).items():
             with about(name):
-                link = str(check_link(alone.link.connect))
+                link = str(check_link(alone.link.connect, patient=patient))
             if links.setdefault(link, name) != name:
                 raise BadInput(
                     f"aircraft '{links[link]}' and '{name}' both have the link {link}; each needs its own"
@@ -138,7 +145,9 @@ def _prepared(
         contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door,
         contextlib.closing(open_doors(settings.doors)) as doors,
     ):
-        yield Prepared(area, grid, sensors, settings, restarted, door, doors, signing_key, console, telling)
+        yield Prepared(
+            area, grid, sensors, settings, restarted, patient, door, doors, signing_key, console, telling
+        )
 
 
 def _ready(prepared: Prepared) -> list[Search]:
@@ -154,7 +163,8 @@ def _ready(prepared: Prepared) -> list[Search]:
 
 
 def _fly(prepared: Prepared, searches: list[Search], folder: Path, journal: Journal) -> int:
-    return asyncio.run(Service(prepared, searches, folder).fly(journal))
+    with whatever_the_terminal_does():
+        return asyncio.run(Service(prepared, searches, folder).fly(journal))
 
 
 def searches_of(prepared: Prepared) -> list[Search]:
@@ -215,7 +225,7 @@ def _signing_key(settings: Settings) -> bytes | None:
 
 
 def _new_folder(parent: Path, name: str) -> Path:
-    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "area"
+    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:MOST_OF_A_NAME] or "area"
     stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
     try:
         for number in range(100):
@@ -291,7 +301,7 @@ class Service:
             if self.world is not None:
                 await self.world.stop()
         if self.view.squad is None:
-            return EXIT_CODES["aborted"]
+            return BEGUN_AGAIN if self.prepared.patient else EXIT_CODES["aborted"]
         return self._leave_results(self.view.squad, began)
 
     def _leave_results(self, squad: Squad, began: float) -> int:
@@ -323,6 +333,7 @@ class Service:
             allow_arming=self.settings.mock or self.settings.flight.takeoff,
             link_lost_s=link.silent_after_s,
             arming_patience_s=link.connect_timeout_s,
+            wait_for_ever=self.prepared.patient,
             read_return_height=self.search.grid.relief is not None,
             read_motion=True,
             signing_key=self.prepared.signing_key,

@@ -7,10 +7,13 @@ files of this package: after a change or a move no old machine code is run.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
+import stat
 import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
@@ -24,21 +27,57 @@ R = TypeVar("R")
 
 
 def cache_folder(package: Path = Path(__file__).parents[1]) -> Path:
-    """NUMBA_CACHE_DIR, or the user's cache folder, and in it a folder for these very files of `package`."""
+    """NUMBA_CACHE_DIR, or the user's cache folder, and in it a folder for these very files of `package`.
+
+    Where neither can be written to, a folder of the user's own among the temporary files; that is said.
+    """
     digest = hashlib.sha256()
     for source in sorted(package.rglob("*.py")):
         text = source.read_bytes()
         digest.update(f"{source.relative_to(package).as_posix()} {len(text)} ".encode())
         digest.update(text)
+    name = f"kernels-{digest.hexdigest()[:12]}"
     chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen:
-        base = Path(chosen)
-    else:
-        try:
-            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "roisearch"
-        except RuntimeError:  # a service's user may have no home
-            base = Path(tempfile.gettempdir()) / "roisearch"
-    return base / f"kernels-{digest.hexdigest()[:12]}"
+    try:
+        base = Path(chosen) if chosen else _user_cache()
+        if _can_be_written(base / name):
+            return base / name
+        where = str(base)
+    except RuntimeError:  # a service's user may have no home
+        where = "a user without a home"
+    own = _temporary()
+    warnings.warn(
+        f"{where}: no place to keep compiled kernels; {own} is used, until it is cleared: set NUMBA_CACHE_DIR to a "
+        "folder that can be written to",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+    return own / name
+
+
+def _user_cache() -> Path:
+    """Raises RuntimeError for a user without a home."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "roisearch"
+
+
+def _can_be_written(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _temporary() -> Path:
+    """A folder that this user alone writes to: what is kept there is run."""
+    folder = Path(tempfile.gettempdir()) / f"roisearch-{os.getuid()}"
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        is_ = folder.lstat()
+        if stat.S_ISDIR(is_.st_mode) and is_.st_uid == os.getuid() and not is_.st_mode & 0o022:
+            return folder
+    return Path(tempfile.mkdtemp(prefix="roisearch-"))
 
 
 _config: Any = numba.config

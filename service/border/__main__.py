@@ -15,6 +15,7 @@ import os
 import signal
 import socket
 import sys
+from pathlib import Path
 from typing import Any
 
 from service.border.asking import Asking
@@ -22,12 +23,15 @@ from service.border.channel import Channel
 from service.border.distant import DistantRun
 from service.border.hello import Hello
 from service.border.memory import SharedMap
+from service.outlet import OF_A_TERMINAL, nobody_waits
 from service.telling import Telling
 
 BEAT_S = 1.0
 _MOST_UNSENT = 1 << 16
 _PR_SET_PDEATHSIG = 1
 _NICENESS = 5  # the flight has three times our share of a busy core
+_OOM, _ENDED_FIRST = Path("/proc/self/oom_score_adj"), 500
+"""Where memory runs out, the kernel ends this process, which is started again, and not the flight."""
 _MOST_CHARACTERS = 4000
 
 
@@ -107,12 +111,15 @@ def main() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     with contextlib.suppress(OSError):  # where a sandbox does not let us, the kernel's shares are equal
         os.nice(_NICENESS)
-    for number in (signal.SIGINT, signal.SIGTERM):
+    with contextlib.suppress(OSError):
+        _OOM.write_text(str(_ENDED_FIRST))
+    for number in (signal.SIGINT, signal.SIGTERM, *OF_A_TERMINAL):
         signal.signal(number, signal.SIG_IGN)
     end = socket.socket(fileno=int(sys.argv[1]))
     hello = Hello.read(int(sys.argv[2]))
     if os.getppid() == parent:  # else it died before the kernel knew that we go with it
-        asyncio.run(serve(end, hello))
+        with nobody_waits():
+            asyncio.run(serve(end, hello))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ MOST_IN_A_FRAME = 64
 MOST_TEXT = 1 << 18
 """Characters of reports in a frame, unless a single one has more."""
 MOST_ORDERS = 64
+"""As many as the door lets in: half of them only such that stop the aircraft."""
 MOST_NEWS = 4
 MOST_ROWS = 2000
 """Of track, hits or curve in one answer; the rest comes with the next."""

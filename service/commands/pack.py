@@ -28,15 +28,15 @@ def main(arguments: Sequence[str]) -> int:
     """Write the file; returns the exit code. Raises BadInput."""
     options = parser().parse_args(list(arguments))
     from service.config import variable_name
-    from service.journal import read_meta
-    from service.packing import left_out, pack
+    from service.packing import pack
+    from service.resume import stored_settings
     from service.survey import JOURNAL
+    from service.unpacking import not_taken_over
 
     out = options.out or Path(f"{options.run.resolve().name}.zip")
     rows = pack(options.run, out)
     print(f"{out}: {rows} rows, the area and the settings without secrets")
-    if stays := left_out(read_meta(options.run / JOURNAL, "settings")):
-        keys = [f"{section}.{key}" for section, key in stays]
+    if keys := not_taken_over(stored_settings(options.run / JOURNAL, {})):
         print(
             f"to be given again there: {', '.join(keys)}, by variables such as {variable_name(keys[0])}=..."
         )

@@ -4,7 +4,7 @@ Every key with its unit, default and meaning stands in `config/service.toml`; a 
 """
 
 from service.config.aircraft import ONLY, about, each_aircraft, name_of
-from service.config.keys import KNOWN_KEYS, nearest_key, without_unknown
+from service.config.keys import KNOWN_KEYS, checked, nearest_key, without_unknown
 from service.config.reading import changed_settings, file_problems, read_settings, read_toml, variable_name
 from service.config.tables import (
     MOCK_SPEEDUP,
@@ -36,6 +36,7 @@ __all__ = [
     "TellingSettings",
     "about",
     "changed_settings",
+    "checked",
     "each_aircraft",
     "file_problems",
     "name_of",

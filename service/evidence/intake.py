@@ -74,6 +74,8 @@ class Intake:
         self.search, self.sensor, self.journal = search, sensor, journal
         self.moments, self.pose_at, self.told, self.believed = moments, pose_at, told, believed
         self.passes = Passes() if passes is None else passes
+        self.placed: Callable[[], bool] = lambda: True
+        """Whether the telemetry has told any position of the aircraft so far."""
         self.counts = Counts()
         self._ids: OrderedDict[str, None] = OrderedDict()
         self._waiting: list[WaitingReport] = []
@@ -368,12 +370,12 @@ class Intake:
     def _pose(self, report: Report, captured: float) -> FramePose:
         """Where the frame was taken: as the report says, else as the telemetry of that time; raises Unreadable."""
         own, known = report.pose, self.pose_at(captured)
+        if known is None and (own is None or self.placed()):  # what cannot be compared is not believed either
+            raise Unreadable(
+                f"no position of the aircraft is known and trusted for captured_at {report.captured_at:.3f}"
+            )
         if own is None:
-            if known is None:
-                raise Unreadable(
-                    "no position of the aircraft is known and trusted for "
-                    f"captured_at {report.captured_at:.3f}"
-                )
+            assert known is not None
             return known
         if known is not None:
             check_pose(own, known)

@@ -16,6 +16,8 @@ Gap = Callable[[float, float], float]
 """How far a position (latitude, longitude) lies beside what the frame shows, in metres; 0 within it."""
 SIGMAS = 3.0  # so many standard deviations may a detection lie beside what its frame shows
 MOST_APART_M = 50.0  # between a report's pose and the telemetry's: far more than either's error
+MOST_APART_UP_M = 10.0
+"""The same for the height, or half of it where that is more: a look from the ground is none from above it."""
 _EARTH_M = 6_371_000.0
 _BESIDE_IMAGE = (
     0.05  # part of the image's side by which the middle of a box may lie outside: clipped and grown boxes
@@ -82,7 +84,7 @@ def check_pose(told: CameraPose, known: FramePose) -> None:
             "another time or aircraft? Leave pose out to have it looked up"
         )
     off = told.height_m - known.height_m
-    if abs(off) > max(MOST_APART_M, 0.5 * known.height_m):
+    if abs(off) > max(MOST_APART_UP_M, 0.5 * abs(known.height_m)):
         raise Unreadable(
             f"the report's pose is {abs(off):.0f} m {'above' if off > 0 else 'below'} where the telemetry has the "
             "aircraft; height_m counts from the launch point, not from sea level"

@@ -13,6 +13,10 @@ def said_of(report: Report, reading: Reading, looks: int, hits: int) -> str:
     said = []
     if not report.usable:
         said.append("the frame shows nothing, says the report (usable is false)")
+        if report.detections:
+            said.append(
+                "its detections do not count: a frame with the target in it is usable, so send it as that"
+            )
     elif not looks:
         footprint = reading.footprint
         said.append(

@@ -10,6 +10,7 @@ import asyncio
 import base64
 import contextlib
 import ipaddress
+import json
 import math
 import time
 from collections import Counter
@@ -42,6 +43,9 @@ ORDERS = "/api/commands"
 JSON_KINDS = ("application/json",)
 GEOJSON_KINDS = {"/api/news": (*JSON_KINDS, "application/geo+json")}
 """What else a body may be called, by its path: no script of another site can send this unasked either."""
+STOPS = ("hold", "return", "finish", "abort")
+"""Orders that stop the aircraft or bring it home."""
+MAPS = frozenset({"/api/map", "/api/map.png"})
 MAY = "roisearch.scope"
 """Under this name the ASGI scope says what the token of a request opens."""
 
@@ -118,10 +122,14 @@ class Guard:
             self._check_origin(scope, headers)
             self._check_token(scope, headers)
             self._check_rate(scope)
-            with self._slots.taken(scope):
-                kinds = GEOJSON_KINDS.get(scope["path"], JSON_KINDS)
-                body = await self._body(headers, incoming, kinds)
-                await self._pass_on(scope, receive if body is None else _replay(body, receive), send)
+            kind = _kind(scope["path"])
+            with self._slots.taken(kind, scope):
+                body = await self._body(headers, incoming, GEOJSON_KINDS.get(scope["path"], JSON_KINDS))
+                if kind != "bodies":
+                    await self._pass_on(scope, receive if body is None else _replay(body, receive), send)
+            if kind == "bodies":  # whoever gives an order has told it by now
+                with self._slots.taken("stops" if _stops(body) else "orders", scope):
+                    await self._pass_on(scope, receive if body is None else _replay(body, receive), send)
         except Refusal as refusal:
             if _announces_body(headers):
                 await self._discard(incoming)
@@ -253,19 +261,21 @@ class Guard:
 
 class Slots:
     """How many requests of a kind may be under way at a time, and how many of them of one address. Orders have slots of
-    their own: however many reports are on their way in and maps on their way out, an order is not refused for them."""
+    their own: however many reports are on their way in and maps on their way out, an order is not refused for them.
+    So have the bodies of orders that are still coming, and orders that stop the aircraft, which no other keeps waiting.
+    """
 
-    MOST_OF_ONE: ClassVar[Mapping[str, int]] = {"maps": 4}
-    MOST: ClassVar[Mapping[str, int]] = {"orders": 32, "reports": 64, "maps": 8, "others": 64}
-    MAPS = frozenset({"/api/map", "/api/map.png"})
+    MOST_OF_ONE: ClassVar[Mapping[str, int]] = {"maps": 4, "bodies": 16}
+    MOST: ClassVar[Mapping[str, int]] = {
+        "bodies": 64, "orders": 32, "stops": 32, "reports": 64, "maps": 8, "others": 64,
+    }  # fmt: skip
 
     def __init__(self) -> None:
         self._taken: Counter[str | tuple[str, str]] = Counter()
 
     @contextlib.contextmanager
-    def taken(self, request: Request) -> Iterator[None]:
-        """Hold a slot while a request is answered; raises Refusal when there is none left."""
-        kind = self._kind(request["path"])
+    def taken(self, kind: str, request: Request) -> Iterator[None]:
+        """Hold a slot of a kind while a request is answered; raises Refusal when there is none left."""
         of_one, most_of_one = (kind, client_of(request)), self.MOST_OF_ONE.get(kind, self.MOST[kind])
         if self._taken[kind] >= self.MOST[kind]:
             raise Refusal(503, f"{self.MOST[kind]} such requests are under way already; try again", 1.0)
@@ -277,10 +287,21 @@ class Slots:
         finally:
             self._taken -= Counter((kind, of_one))
 
-    def _kind(self, path: str) -> str:
-        if path in self.MAPS:
-            return "maps"
-        return {ORDERS: "orders", "/api/reports": "reports"}.get(path, "others")
+
+def _kind(path: str) -> str:
+    """Of which slots the first is that a request takes."""
+    if path in MAPS:
+        return "maps"
+    return {ORDERS: "bodies", "/api/reports": "reports"}.get(path, "others")
+
+
+def _stops(body: bytes | None) -> bool:
+    """Whether an order stops the aircraft or brings it home."""
+    try:
+        order = json.loads(body or b"")
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(order, dict) and order.get("command") in STOPS
 
 
 class _Incoming:

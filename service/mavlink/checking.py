@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
+import logging
 import os
+import time
 from pathlib import Path
 
 from service.errors import BadInput
@@ -11,22 +14,39 @@ from service.mavlink.errors import LinkError
 from service.mavlink.transports import Transport, make_transport, pyserial
 from service.mavlink.url import LinkKind, LinkUrl, parse_url
 
+log = logging.getLogger("roisearch")
+AGAIN_S = 1.0
+TOLD_EVERY = 10
 
-def check_link(text: str) -> LinkUrl:
+
+def check_link(text: str, *, patient: bool = False) -> LinkUrl:
     """The address of a link that can be opened now, before anything has been prepared for it: nobody is spoken to.
+
+    `patient`: wait for a link that cannot be opened, as long as that takes; it says so.
 
     Raises:
         BadInput: as `parse_url`; its port is taken, its host is not known, its device is not there or may not be used.
     """
     url = parse_url(text)
-    try:
-        if url.kind is LinkKind.SERIAL:
-            _check_device(url)  # to open it would set its lines, which starts some boards anew
+    for tried in itertools.count():
+        try:
+            _check(url)
+        except LinkError as error:
+            if not patient:
+                raise BadInput(str(error)) from None
+            if tried % TOLD_EVERY == 0:
+                log.warning("%s; it is tried again, as an aircraft may be in the air", error)
+            time.sleep(AGAIN_S)
         else:
-            asyncio.run(_open_once(make_transport(url)))
-    except LinkError as error:
-        raise BadInput(str(error)) from None
+            break
     return url
+
+
+def _check(url: LinkUrl) -> None:
+    if url.kind is LinkKind.SERIAL:
+        _check_device(url)  # to open it would set its lines, which starts some boards anew
+    else:
+        asyncio.run(_open_once(make_transport(url)))
 
 
 async def _open_once(transport: Transport) -> None:

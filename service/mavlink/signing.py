@@ -53,6 +53,8 @@ class Signer:
         self._link_id = link_id
         self._timestamp = 0
         self._streams: dict[tuple[int, int, int], int] = {}
+        self.behind_s = 0.0
+        """So many seconds behind our time the last frame was that was signed with our key, and refused for that."""
 
     @property
     def timestamp(self) -> int:
@@ -87,6 +89,7 @@ class Signer:
         stream, timestamp = (frame[5], frame[6], block[0]), int.from_bytes(block[1:7], "little")
         last = self._streams.get(stream, self._timestamp - _NEW_STREAM_LAG - 1)
         if not last < timestamp <= _LATEST:
+            self.behind_s = max(0.0, (self._timestamp - timestamp) / PER_S)
             return False
         self._streams[stream] = timestamp
         self.advance(timestamp)

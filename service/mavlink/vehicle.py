@@ -14,6 +14,7 @@ that the wire has is read first (`Shell.pump`), so that the decision is taken on
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
 from collections.abc import AsyncIterator, Callable
 
@@ -39,6 +40,7 @@ from service.mavlink.telemetry import Telemetry
 from service.mavlink.transports import make_transport
 from service.mavlink.url import parse_url
 
+log = logging.getLogger("roisearch")
 _MODE_S = 6.0
 _COMPLAINT_S = 0.3
 _ARM_AGAIN_S = 2.0
@@ -46,6 +48,7 @@ _LATELY_S = 10.0
 _CLIMB_START_S = 20.0
 _CLIMB_MPS = 0.7  # at least, unless its parameters say that it climbs more slowly
 _CLIMB_SHARE = 0.7  # of what they say, on the whole way up
+_CLOCKS_APART_S = 60.0
 _SEVERITY_INFO = 6
 _SEVERITY_WARNING = 4
 
@@ -154,26 +157,40 @@ class Vehicle:
         Raises:
             NoVehicle: none was heard in time, or not one that can be flown.
         """
-        if await self.wait_until(lambda t: self._core.paired and t.position_known, timeout_s):
-            return self.telemetry
+        while not await self.wait_until(lambda t: self._core.paired and t.position_known, timeout_s):
+            why = self._why_none(timeout_s)
+            if not self.settings.wait_for_ever:
+                raise NoVehicle(why)
+            log.warning("%s; it is still waited for, as it may be in the air", why)
+        return self.telemetry
+
+    def _why_none(self, timeout_s: float) -> str:
+        """Why no vehicle was heard in time."""
         core, where = self._core, self._shell.address
         if core.autopilot is not None:
-            raise NoVehicle(
+            return (
                 f"system {core.telemetry.system_id} ({core.autopilot.title}) is heard on {where} "
                 f"but has sent no position in {timeout_s:g} s; it may have no GPS fix yet"
             )
         if core.rejected:
-            raise NoVehicle(f"the only autopilot heard on {where} cannot be flown: {core.rejected}")
+            return f"the only autopilot heard on {where} cannot be flown: {core.rejected}"
+        signer = core.codec.signer
+        if signer is not None and signer.behind_s > _CLOCKS_APART_S and not core.messages_received:
+            return (
+                f"MAVLink is heard on {where}, signed with our key at a time that is {signer.behind_s:.0f} s behind "
+                f"ours: our clock is wrong, or was, as {self.settings.signing_timestamp_file} has it; set it, delete "
+                "that file"
+            )
         if core.codec.refused and not core.messages_received:
-            raise NoVehicle(
+            return (
                 f"MAVLink is heard on {where}, but not signed with our key ({core.codec.refused} frames refused); "
                 "is the key that of the vehicle, and does this link of it sign?"
             )
         if core.messages_received:
-            raise NoVehicle(f"MAVLink is heard on {where}, but no autopilot's heartbeat in {timeout_s:g} s")
+            return f"MAVLink is heard on {where}, but no autopilot's heartbeat in {timeout_s:g} s"
         if core.bytes_received:
-            raise NoVehicle(f"bytes arrive on {where}, but they are not MAVLink; is the baud rate right?")
-        raise NoVehicle(f"nothing was heard on {where} in {timeout_s:g} s")
+            return f"bytes arrive on {where}, but they are not MAVLink; is the baud rate right?"
+        return f"nothing was heard on {where} in {timeout_s:g} s"
 
     async def wait_ready(self, timeout_s: float) -> None:
         """Wait until the vehicle can be armed.

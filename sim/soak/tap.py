@@ -57,6 +57,7 @@ class Tap:
         self.url = f"udpout://127.0.0.1:{self._front.getsockname()[1]}"
         self.motions: list[tuple[float, str]] = []
         self.texts: list[str] = []
+        self.beats = 0
         self._from_service, self._from_autopilot = from_service, from_autopilot
         self._parser, self._back_parser = self._robust(), self._robust()
         self._writer = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
@@ -122,7 +123,9 @@ class Tap:
     def _note(self, data: bytes) -> None:
         now = time.monotonic()
         for message in self._parser.parse_buffer(data) or []:
-            if message.get_type() == "STATUSTEXT":
+            if message.get_type() == "HEARTBEAT":
+                self.beats += 1
+            elif message.get_type() == "STATUSTEXT":
                 self.texts.append(message.text)
             elif name := motion_name(message):
                 self.motions.append((now, name))

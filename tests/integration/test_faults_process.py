@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from service.journal import read_rows
+from service.progress import LINE_EVERY_S
 from tests.integration.scene import Scene, flight
 from tests.integration.stalling import STALL_S
 
@@ -77,3 +78,32 @@ def test_a_full_disk_in_flight_sends_the_aircraft_home_and_tells_the_pilot(tmp_p
     assert "Traceback" not in scene.service.said
     numbers = [row.seq for row in read_rows(scene.journal)]
     assert numbers == list(range(1, len(numbers) + 1))
+
+
+def test_outputs_that_nobody_reads_hold_nothing_up(tmp_path: Path) -> None:
+    """Ctrl-S in its terminal, a connection that is lost, a pager: the flight goes on, obeys, and ends."""
+    with flight(tmp_path, "ardupilot", module=STALLING) as scene:
+        scene.searching()
+        scene.service.process.send_signal(signal.SIGRTMIN)
+        scene.service.wait_for("nobody reads on")
+        time.sleep(2.0 * LINE_EVERY_S + 1.0)  # it has had something to say since
+        beats = scene.tap.beats
+        scene.fly(5.0 * scene.speedup)
+        assert scene.tap.beats >= beats + 4
+        assert scene.order("hold") == "HOLDING"
+        scene.order("abort")
+        assert scene.service.exit_code(30.0) == 4
+
+
+def test_a_terminal_that_is_closed_ends_nothing(tmp_path: Path) -> None:
+    """An ssh session that is lost: the flight goes on, as with nohup."""
+    with flight(tmp_path, module=STALLING) as scene:
+        scene.searching()
+        scene.service.process.send_signal(signal.SIGRTMIN + 1)
+        scene.service.wait_for("hung up")
+        for number in (signal.SIGHUP, signal.SIGTSTP, signal.SIGTTOU):
+            scene.service.process.send_signal(number)
+        time.sleep(LINE_EVERY_S + 1.0)  # it has had something to say since
+        scene.moves_again()
+        scene.order("abort")
+        assert scene.service.exit_code(30.0) == 4

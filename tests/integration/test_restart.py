@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import signal
 import time
 from collections.abc import Iterator
@@ -11,9 +13,12 @@ from pathlib import Path
 import httpx
 import pytest
 
+from service.journal import Journal
+from service.survey import AREA, JOURNAL
 from sim.soak.process import Process
 from tests.integration.flight import running
 from tests.integration.scene import Scene, flight
+from tests.service.export.recorded import record
 
 pytestmark = pytest.mark.timeout(400)
 SPEEDUP = 5.0
@@ -47,7 +52,8 @@ def the_run(scene: Scene) -> str:
     return str(folder)
 
 
-@pytest.mark.parametrize(("person", "flavor"), [("pilot", "px4"), ("operator", "ardupilot")])
+@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
+@pytest.mark.parametrize("person", ["pilot", "operator"])
 def test_what_a_person_stopped_stays_stopped_across_a_kill(flavor: str, person: str, tmp_path: Path) -> None:
     with flight(tmp_path, flavor, speedup=SPEEDUP) as scene:
         scene.searching()
@@ -111,3 +117,28 @@ def test_a_crash_in_flight_and_the_units_restart_are_one_search(tmp_path: Path) 
             assert len(list(scene.runs.iterdir())) == 1
             names = {name for _, name in scene.tap.motions[motions:]}
             assert names <= {"MAV_CMD_DO_REPOSITION", "MAV_CMD_DO_CHANGE_SPEED"}, service.said
+
+
+def test_over_an_interrupted_flight_it_waits_for_a_device_that_is_gone_and_for_an_aircraft_that_is_silent(
+    tmp_path: Path,
+) -> None:
+    """What made it crash, a brown-out say, may take the serial device along, which then comes back by another name."""
+    folder = record(tmp_path / "runs" / "slope", part=0.0)
+    device, told = tmp_path / "by-id", tmp_path / "settings.toml"
+    with contextlib.closing(Journal(folder / JOURNAL)) as journal:
+        settings = journal.meta("settings")
+        journal.set_meta("settings", {**settings, "link": {**settings["link"], "connect_timeout_s": 2.0}})
+    told.write_text("[link]\nconnect_timeout_s = 2\n", encoding="utf-8")
+    again = ["--area", str(folder / AREA), "--runs", str(tmp_path / "runs"), "--config", str(told), "--flat"]
+    link = f"serial://{device}:57600"
+    with running("service", *again, "--connect", link, "--go-on", "--http", "127.0.0.1:0") as service:
+        service.wait_for("by-id:57600: there is no such device; .* it is tried again")
+        other, terminal = os.openpty()
+        device.symlink_to(os.ttyname(terminal))
+        service.wait_for("listening on")
+        service.wait_for("(?s)(nothing was heard on .* in 2 s; it is still waited for.*){2}")
+        assert service.process.poll() is None
+        service.process.terminate()  # a person ends the waiting
+        assert service.exit_code(60.0) == 4
+    os.close(other)
+    os.close(terminal)

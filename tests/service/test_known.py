@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import json
 from typing import Any
 
@@ -31,6 +32,9 @@ WALKS = field({"moves": "walks", "speed_mps": 0.8, "stops_per_hour": 2})
 STILL = field(None)
 CELLS = np.argwhere(WALKS.searchable)
 BEGIN = 1_700_000_000.0
+
+
+HALF_OUTSIDE = dataclasses.replace(field(None), outside=0.5)
 
 
 def look(number: int, *, hit: bool = False) -> Observation:
@@ -139,3 +143,32 @@ def test_a_decision_is_made_for_where_the_target_may_be_by_then() -> None:
         asyncio.run(search.decide(SearchState(WALKS.start), [], now=now))
     assert planned[1] < 0.8 * planned[0] == 0.8 * planned[2]
     assert search.belief.digest() == before  # only a word of its time moves what is believed
+
+
+def clue(number: int, factor: float, cells: list[int]) -> FieldNews:
+    """A clue over some of the cells that are searched."""
+    at = np.argwhere(HALF_OUTSIDE.searchable).astype(np.int64)[cells]
+    return FieldNews(f"clue {number}", "clue", "", (47.0, 8.3), at, np.full(len(at), factor))
+
+
+@settings(max_examples=30)
+@given(
+    st.lists(st.sampled_from([1e-3, 0.2, 5.0, 1e3]), min_size=1, max_size=6),
+    st.integers(1, 60),
+    st.sampled_from([1, 5, 10_000]),
+)
+def test_however_many_clues_leave_a_belief_that_is_one(factors: list[float], times: int, count: int) -> None:
+    cells = list(range(int(HALF_OUTSIDE.searchable.sum())))[:count]
+    known = Known(HALF_OUTSIDE, 0.9, 0.97)
+    for number, factor in enumerate(factors * times):
+        known._field.append(
+            clue(number, factor, cells)
+        )  # not one after the other: each reckons all of them anew
+    known.take(clue(-1, factors[0], cells), 1000.0)
+    there, outside = known.belief.probability(), known.belief.outside
+    assert np.isfinite(there).all()
+    assert float(there.sum()) + outside == pytest.approx(1.0)
+    assert (there[HALF_OUTSIDE.searchable & (HALF_OUTSIDE.prior > 0.0)] > 0.0).all()
+    odds = np.clip(np.log(factors).sum() * times + np.log(factors[0]), -25.0, 25.0)
+    if count == 10_000:  # all that is searched
+        assert outside == pytest.approx(1.0 / (1.0 + np.exp(odds)), rel=1e-6, abs=1e-10)

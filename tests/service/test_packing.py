@@ -15,10 +15,11 @@ from service.evidence.images import Images
 from service.export.run import read_run
 from service.journal import Journal, read_meta, read_rows
 from service.mark import read_mark
-from service.packing import given_again, pack, unpack
+from service.packing import pack
 from service.provenance import FINGERPRINTS, fingerprints, refuse_changed
 from service.resume import stored_settings
 from service.survey import JOURNAL
+from service.unpacking import given_again, unpack
 from tests.service.export.recorded import SETTINGS, record
 
 
@@ -46,7 +47,7 @@ def test_a_run_arrives_with_its_rows_its_ground_and_its_files_but_no_secrets(tmp
     assert pack(folder, tmp_path / "slope.zip") == len(rows)
     with zipfile.ZipFile(tmp_path / "slope.zip") as packed:
         assert not any(b"/etc/roisearch" in packed.read(name) for name in packed.namelist())
-    there = unpack(tmp_path / "slope.zip", tmp_path / "other" / "runs")
+    there = unpack(tmp_path / "slope.zip", tmp_path / "other" / "runs", {})
     assert there == tmp_path / "other" / "runs" / "slope"
     assert list(read_rows(there / JOURNAL)) == rows
     assert read_mark(there / JOURNAL) == len(rows)
@@ -63,7 +64,7 @@ def test_a_run_that_is_being_flown_is_packed_with_all_that_is_on_disk(tmp_path: 
     journal = Journal(folder / JOURNAL)
     journal.write(9e9, "yielded", {"reason": "the pilot"}).result()  # in the -wal file
     count = pack(folder, tmp_path / "slope.zip")
-    there = unpack(tmp_path / "slope.zip", tmp_path / "runs")
+    there = unpack(tmp_path / "slope.zip", tmp_path / "runs", {})
     assert [row.seq for row in read_rows(there / JOURNAL)] == list(range(1, count + 1))
     assert list(read_rows(there / JOURNAL))[-1].kind == "yielded"
     journal.close()
@@ -80,7 +81,7 @@ def test_what_is_no_packed_run_is_refused_and_leaves_nothing(tmp_path: Path) -> 
     (tmp_path / "bent.zip").write_bytes(content[:middle] + bytes(64) + content[middle + 64 :])
     for name in ("tea.zip", "cut.zip", "bent.zip"):
         with pytest.raises(BadInput, match=rf"{name}: is no packed run|journal is damaged"):
-            unpack(tmp_path / name, tmp_path / "runs")
+            unpack(tmp_path / name, tmp_path / "runs", {})
     assert not list((tmp_path / "runs").glob("*")) if (tmp_path / "runs").exists() else True
 
 
@@ -89,9 +90,9 @@ def test_neither_packing_nor_unpacking_overwrites(tmp_path: Path) -> None:
     pack(folder, tmp_path / "slope.zip")
     with pytest.raises(BadInput, match=r"slope\.zip: is there already; give another --out"):
         pack(folder, tmp_path / "slope.zip")
-    unpack(tmp_path / "slope.zip", tmp_path)
+    unpack(tmp_path / "slope.zip", tmp_path, {})
     with pytest.raises(BadInput, match="slope: is there already; go on with it"):
-        unpack(tmp_path / "slope.zip", tmp_path)
+        unpack(tmp_path / "slope.zip", tmp_path, {})
 
 
 def test_the_command_names_the_file_after_the_run(
@@ -121,7 +122,7 @@ def test_rasters_of_the_ground_come_along(tmp_path: Path, raster: str) -> None:
     journal.set_meta("settings", {**settings, "ground": ground})
     journal.close()
     pack(folder, tmp_path / "slope.zip")
-    there = unpack(tmp_path / "slope.zip", tmp_path / "runs")
+    there = unpack(tmp_path / "slope.zip", tmp_path / "runs", {})
     carried = Path(getattr(stored_settings(there / JOURNAL, {}).ground, f"{raster}_file"))
     assert carried == (there / "forest.tif").resolve()
     assert carried.read_bytes() == b"as it is"
@@ -141,7 +142,7 @@ def test_files_of_one_name_and_the_calibration_of_each_aircraft_come_along(tmp_p
     pack(folder, tmp_path / "slope.zip")
     for each in given:
         each.unlink()
-    there = unpack(tmp_path / "slope.zip", tmp_path / "runs")
+    there = unpack(tmp_path / "slope.zip", tmp_path / "runs", {})
     settings = stored_settings(there / JOURNAL, {})
     refuse_changed(there, settings, read_meta(there / JOURNAL, FINGERPRINTS))
     carried = [Path(each.sensor.given["calibration_file"]) for each in settings.aircraft]
@@ -163,7 +164,7 @@ def test_pictures_and_the_area_as_it_was_given_come_along(tmp_path: Path) -> Non
     pack(folder, tmp_path / "slope.zip")
     with zipfile.ZipFile(tmp_path / "slope.zip", "a") as packed:
         packed.writestr("pictures/../../elsewhere.jpg", b"")
-    there = unpack(tmp_path / "slope.zip", tmp_path / "runs")
+    there = unpack(tmp_path / "slope.zip", tmp_path / "runs", {})
     assert (there / "area-as-given.kml").read_text() == "<kml/>"
     assert Images(there).read(name) == b"\xff\xd8\xff\xff\xd9"
     assert not list(tmp_path.rglob("elsewhere.jpg"))

@@ -34,6 +34,6 @@ def test_a_door_that_does_not_open_is_told_before_the_flight(
         contextlib.closing(open_door(HttpSettings(listen="127.0.0.1:0"), {})) as door,
         contextlib.closing(open_doors(DoorSettings())) as doors,
     ):
-        prepared = Prepared(area, search.grid, sensors, settings, False, door, doors, None, Console())
+        prepared = Prepared(area, search.grid, sensors, settings, False, False, door, doors, None, Console())
         with pytest.raises(RuntimeError, match="the doors could not be opened"):
             asyncio.run(asyncio.wait_for(Service(prepared, [search], tmp_path).fly(journal), 30.0))

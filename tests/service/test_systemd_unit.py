@@ -11,7 +11,7 @@ import pytest
 
 from service.cli import parser
 from service.config import KNOWN_KEYS
-from service.run import EXIT_CODES
+from service.run import BEGUN_AGAIN, EXIT_CODES
 
 UNIT = Path(__file__).parents[2] / "config" / "roisearch.service"
 PROGRAM = "/opt/roisearch/bin/roisearch-service"
@@ -56,6 +56,8 @@ def test_systemd_rates_the_sandbox_as_closed(tmp_path: Path) -> None:
         ("RestrictAddressFamilies", "AF_INET AF_INET6 AF_UNIX"),
         ("CapabilityBoundingSet", ""),
         ("Restart", "on-failure"),
+        ("StartLimitIntervalSec", "0"),
+        ("OOMPolicy", "continue"),
     ],
 )
 def test_the_sandbox_has_its_walls(key: str, value: str) -> None:
@@ -96,6 +98,7 @@ def test_the_token_comes_as_a_credential_and_its_variable_is_a_setting() -> None
 
 
 def test_only_a_crash_is_started_over() -> None:
+    assert BEGUN_AGAIN not in (*EXIT_CODES.values(), 2)
     ended = {int(code) for code in lines("SuccessExitStatus")[0].split()} | {0}
     assert set(EXIT_CODES.values()) == ended
     assert lines("RestartPreventExitStatus") == ["2"]

@@ -19,6 +19,7 @@ NOT_TO_THE_END = {
     "pip install": INSTALLS,
     "apt-get install": INSTALLS,
     ". .venv/bin/activate": INSTALLS,
+    "export PX4_HOME_LAT": OTHERS,
     "make px4_sitl": OTHERS,
     "sim_vehicle.py": OTHERS,
     "mavlink-routerd": OTHERS,

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -107,3 +110,37 @@ def test_a_kernel_that_was_moved_or_changed_finds_no_old_machine_code(tmp_path: 
     source.write_text("one = 1\n")
     assert cache_folder(package) == folders[1]
     assert cache_folder() == Path(numba.config.CACHE_DIR)
+
+
+def test_with_a_home_that_cannot_be_written_to_kernels_are_kept_where_only_their_user_writes(
+    tmp_path: Path,
+) -> None:
+    program = (
+        "import numba, numpy\nfrom roisearch.kernels.compiled import kernel\n"
+        "@kernel\ndef twice(x: float) -> float:\n    return 2.0 * x\n"
+        "assert twice(2.0) == 4.0\nprint(numba.config.CACHE_DIR)"
+    )
+    (tmp_path / "program.py").write_text(program)
+    kept = {
+        name: text for name, text in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
+    }
+
+    def folder() -> Path:
+        environment = {
+            **kept,
+            "HOME": "/proc",
+            "TMPDIR": str(tmp_path),
+            "PYTHONPATH": str(Path(__file__).parents[3]),
+        }
+        words = [sys.executable, str(tmp_path / "program.py")]
+        said = subprocess.run(words, env=environment, capture_output=True, text=True, check=True, timeout=120)
+        assert "/proc/.cache/roisearch: no place to keep compiled kernels" in said.stderr
+        assert "set NUMBA_CACHE_DIR" in said.stderr
+        return Path(said.stdout.strip()).parent
+
+    own = tmp_path / f"roisearch-{os.getuid()}"
+    assert folder() == own
+    assert own.stat().st_mode & 0o077 == 0
+    own.chmod(0o777)  # what anybody may have put there is not run
+    assert folder().name.startswith("roisearch-")
+    assert folder() != own

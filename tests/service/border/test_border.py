@@ -21,6 +21,7 @@ from websockets.asyncio.client import connect
 
 from service.border import keeper
 from service.journal import JournalLost
+from service.outlet import OF_A_TERMINAL
 from service.telling import TellingPlan
 from service.telling.settings import Tak
 from service.view.feed import Moment
@@ -204,18 +205,30 @@ def test_a_door_process_that_ends_or_hangs_is_started_again_and_the_flight_goes_
 
 
 def test_the_doors_stay_open_on_the_way_home(tmp_path: Path) -> None:
-    """Ctrl-C and a service manager's SIGTERM are for the flight."""
+    """Ctrl-C and a service manager's SIGTERM are for the flight, and no terminal ends them."""
     run = Flown()
 
     async def talk() -> None:
         async with behind_a_door(run, tmp_path) as client:
             (process,) = await children()
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in (signal.SIGINT, signal.SIGTERM, *OF_A_TERMINAL):
                 os.kill(process, number)
             assert (await client.get("/healthz")).text == "ok\n"
             assert await children() == [process]
 
     asyncio.run(talk())
+
+
+def test_where_memory_runs_out_the_doors_go_first(tmp_path: Path) -> None:
+    def chance(process: int | str) -> int:
+        return int(Path(f"/proc/{process}/oom_score_adj").read_text())
+
+    async def talk() -> int:
+        async with behind_a_door(Flown(), tmp_path):
+            (process,) = await children()
+            return chance(process)
+
+    assert asyncio.run(talk()) >= chance("self") + 400
 
 
 def test_a_flight_that_does_not_answer_is_told_and_does_not_look_healthy(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ NORTH_200_M = 200.0 / 111_195.0
 
 @pytest.fixture
 def make(tmp_path: Path) -> Callable[..., Intake]:
-    def intake(pose: FramePose = HERE, **more: Any) -> Intake:
+    def intake(pose: FramePose | None = HERE, **more: Any) -> Intake:
         sensor = Sensor(FRAME, FieldOfView.point(), 0.9, 0.9, 0.2, 0.8, 30.0, **more)
         journal = Journal(tmp_path / "j.sqlite")
         return Intake(Ground(), sensor, journal, Moments(Clock()), lambda _: pose, lambda *_: None)  # type: ignore[arg-type]
@@ -137,6 +137,36 @@ def test_a_reports_own_pose_far_from_the_telemetry_is_refused(make: Callable[...
     assert "pose lies 200 m from where the telemetry" in sent(intake, pose=there).reason
     above_sea = {"lat": LAT, "lon": LON, "height_m": 480.0, "heading_deg": 0.0}
     assert "450 m above where the telemetry" in sent(intake, pose=above_sea).reason
+
+
+@pytest.mark.parametrize(("up_m", "told_m", "status"), [(0.4, 30.0, "refused"), (30.0, 41.0, "accepted")])
+def test_a_look_from_the_ground_is_no_look_from_above_it(
+    make: Callable[..., Intake], up_m: float, told_m: float, status: str
+) -> None:
+    pose = {"lat": LAT, "lon": LON, "height_m": told_m, "heading_deg": 0.0}
+    receipt = sent(make(FramePose(LAT, LON, up_m, 0.0, 100.0)), pose=pose)
+    assert receipt.status == status
+    assert ("m above where the telemetry has the aircraft" in receipt.reason) == (status == "refused")
+
+
+def test_a_pose_of_its_own_is_believed_only_where_it_can_be_compared(make: Callable[..., Intake]) -> None:
+    pose = {"lat": LAT, "lon": LON, "height_m": 30.0, "heading_deg": 0.0}
+    intake = make(None)
+    before = intake.search.belief.digest()
+    receipt = sent(intake, pose=pose)
+    assert (receipt.status, receipt.looks) == ("refused", 0)
+    assert "no position of the aircraft is known and trusted" in receipt.reason
+    assert intake.search.belief.digest() == before
+    intake.placed = lambda: False  # an aircraft that tells none at all
+    assert sent(intake, pose=pose).looks == 1
+
+
+def test_a_sighting_in_a_frame_that_shows_nothing_is_told_to_who_sent_it(make: Callable[..., Intake]) -> None:
+    intake = make()
+    receipt = sent(intake, {"lat": LAT, "lon": LON}, usable=False)
+    assert (receipt.status, receipt.hits) == ("accepted", 0)
+    assert "its detections do not count" in receipt.reason
+    assert "its detections" not in sent(intake, usable=False).reason
 
 
 def test_only_the_classes_of_the_settings_are_hits(make: Callable[..., Intake]) -> None:

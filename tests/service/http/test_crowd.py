@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Any, get_args
 
 import httpx
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from service.evidence.reports import OrderReceipt, OrderRequest
 from service.http.crowd import Crowd
+from service.http.guard import STOPS
+from service.mission.orders import STOPPING
 
 from .door import FRAME, HOLD, FakeRun, on_a_socket
 
@@ -94,3 +99,32 @@ def test_an_order_gets_through_where_reports_take_every_slot() -> None:
 
     assert asyncio.run(talk()) == [503, 200]
     assert run.orders == ["hold"]
+
+
+@pytest.mark.parametrize("command", STOPS)
+def test_orders_that_are_not_answered_keep_none_waiting_that_stops_the_aircraft(command: str) -> None:
+    class Slow(FakeRun):
+        async def order(self, command: str, *more: Any, **others: Any) -> OrderReceipt:
+            if command == "launch":
+                await asyncio.sleep(3600.0)
+            return await super().order(command, *more, **others)
+
+    run = Slow()
+
+    async def talk() -> list[int]:
+        async with (
+            on_a_socket(run, commands_per_s=1000.0) as door,
+            httpx.AsyncClient(base_url=door.url, timeout=30.0, limits=httpx.Limits()) as client,
+        ):
+            path, launch = "/api/commands", {"command": "launch"}
+            hung = [asyncio.create_task(client.post(path, json=launch)) for _ in range(40)]
+            done, _ = await asyncio.wait(hung, timeout=2.0)
+            codes = [*{each.result().status_code for each in done}]
+            codes.append((await client.post(path, json={"command": command})).status_code)
+            for each in hung:
+                each.cancel()
+            return codes
+
+    assert asyncio.run(talk()) == [503, 200]  # eight too many, and then the one that counts
+    assert run.orders == [command]
+    assert set(STOPS) == set(STOPPING) & set(get_args(OrderRequest.model_fields["command"].annotation))

@@ -441,3 +441,22 @@ def test_a_signing_autopilot_is_flown_over_a_socket_and_no_other(tmp_path: Path,
         assert int((tmp_path / "signing-timestamp").read_text()) > timestamp_at(START)
 
     asyncio.run(scenario())
+
+
+def test_a_time_of_ours_that_is_ahead_is_told_as_that_and_not_as_a_wrong_key(tmp_path: Path) -> None:
+    kept = tmp_path / "signing-timestamp"
+    kept.write_text(str(timestamp_at(time.time() + 86_400.0)))  # the clock was a day ahead once
+
+    async def scenario() -> None:
+        settings = MavlinkSettings(signing_key=KEY, signing_timestamp_file=kept)
+        async with Vehicle.open("udpin://127.0.0.1:0", clock=Clock(), settings=settings) as vehicle:
+            peer = SocketPeer(vehicle.address, KEY)
+            try:
+                with pytest.raises(
+                    NoVehicle, match=r"signed with our key at a time that is 8640\d s behind ours"
+                ):
+                    await vehicle.connect(1.5)
+            finally:
+                peer.close()
+
+    asyncio.run(scenario())

@@ -1,0 +1,38 @@
+"""What a run leaves behind, and where."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+import pytest
+
+from service.cli import main
+from service.journal import Journal
+from service.report import REPORT
+from service.run import _new_folder  # a whole run for each name would take a minute
+from service.survey import JOURNAL
+from tests.service.export.recorded import record
+
+
+@pytest.mark.parametrize("name", ["a" * 5000, "ä" * 300 + "b", "-" * 5000])
+def test_an_area_with_a_long_name_has_a_folder(name: str, tmp_path: Path) -> None:
+    folder = _new_folder(tmp_path, name)
+    assert folder.is_dir()
+    assert len(folder.name) < 150
+
+
+def test_going_on_without_flying_overwrites_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody is heard on the link: what the flight before has left stays."""
+    folder = record(tmp_path / "slope", part=0.0)
+    with contextlib.closing(Journal(folder / JOURNAL)) as journal:
+        settings = journal.meta("settings")
+        journal.set_meta("settings", {**settings, "link": {**settings["link"], "connect_timeout_s": 1.0}})
+    for name in (REPORT, "track.geojson", "map.png"):
+        (folder / name).write_text("as it was")
+    words = ["--resume", str(folder), "--connect", "udpin://127.0.0.1:0", "--http", "127.0.0.1:0", "--flat"]
+    assert main(words) == 4
+    assert f"nothing was flown: {folder / REPORT} is left as it was" in capsys.readouterr().out
+    assert {(folder / name).read_text() for name in (REPORT, "track.geojson", "map.png")} == {"as it was"}

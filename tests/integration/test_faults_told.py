@@ -48,6 +48,7 @@ DOUBTFUL: dict[str, Faults] = {
     ],
     "ardupilot": [
         ("stream_stops", {"message": "GPS_RAW_INT,GPS2_RAW"}, "GPS is not heard any longer"),
+        ("field", {"message": "EXTENDED_SYS_STATE", "field": "landed_state", "value": 1.0}, "is in the air"),
         ("one_way", {"carries": "up"}, "the autopilot is silent"),
         (
             "field_shifts",
@@ -82,6 +83,7 @@ HARMLESS: dict[str, Faults] = {
     "ardupilot": [
         ("field", {"message": "GLOBAL_POSITION_INT", "field": "hdg", "value": 65535.0}, ""),
         ("field", {"message": "ATTITUDE", "field": "time_boot_ms", "value": 4294967295.0, "times": 1}, ""),
+        ("field", {"message": "GLOBAL_POSITION_INT", "field": "vx", "value": 32767.0}, ""),
         ("stream_freezes", {"message": "ATTITUDE", "stamp": "moves"}, ""),
         ("second_gps", {"fix": 0}, ""),
         ("terrain_report", {"rise": 4.0}, ""),

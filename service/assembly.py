@@ -91,9 +91,9 @@ def assemble(
             pose_at,
             observed,
             believed=view.believed.observe,
-            placed=lambda: len(vehicle.history) > 0,
             passes=Passes(again_s=settings.sensor.hover_look_s or math.inf),
         )
+        intake.placed = lambda: len(vehicle.history) > 0
         remembered.tell(intake)
         return intake
 

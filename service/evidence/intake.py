@@ -67,15 +67,15 @@ class Intake:
         *,
         believed: Callable[[float], None] = lambda seconds: None,
         passes: Passes | None = None,
-        placed: Callable[[], bool] = lambda: True,
     ) -> None:
-        """`moments` tells when a frame was taken, `pose_at` looks it up in the telemetry, and `placed` whether it has
-        told any position so far; `told` is called after each applied observation with the time (perf_counter) at which
-        its report arrived, `believed` after each report with the seconds that it took."""
+        """`moments` tells when a frame was taken, `pose_at` looks that up in the telemetry; `told` is called after each
+        applied observation with the time (perf_counter) at which its report arrived, `believed` after each report with
+        the seconds that it took."""
         self.search, self.sensor, self.journal = search, sensor, journal
         self.moments, self.pose_at, self.told, self.believed = moments, pose_at, told, believed
         self.passes = Passes() if passes is None else passes
-        self.placed = placed
+        self.placed: Callable[[], bool] = lambda: True
+        """Whether the telemetry has told any position of the aircraft so far."""
         self.counts = Counts()
         self._ids: OrderedDict[str, None] = OrderedDict()
         self._waiting: list[WaitingReport] = []

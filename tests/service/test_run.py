@@ -10,7 +10,7 @@ import pytest
 from service.cli import main
 from service.journal import Journal
 from service.report import REPORT
-from service.run import _new_folder
+from service.run import _new_folder  # a whole run for each name would take a minute
 from service.survey import JOURNAL
 from tests.service.export.recorded import record
 

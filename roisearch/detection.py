@@ -76,6 +76,12 @@ class DetectionRecord:
         total = float(self._poa.sum())
         return min(1.0, max(0.0, total - self._left))
 
+    def parts(self, cells: NDArray[np.bool_]) -> tuple[float, float]:
+        """What part of the mass on the map lies in such cells, bool [rows, cols], and what part of it would have been
+        detected there by now: over all cells 1, and `searched`."""
+        there, whole = float(self._poa[cells].sum()), float(self._poa.sum())
+        return there / whole, (there - float(self.undetected()[cells].sum())) / whole
+
     @property
     def searched(self) -> float:
         """POS given that the target is on the map at all."""

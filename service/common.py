@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from roisearch import Fleet
@@ -116,11 +117,11 @@ class Common:
 
     def ground_of(self, known: Known) -> Grid:
         """The grid of the area file without what is excluded by then. Raises BadInput when that leaves nothing."""
-        grid = self.drawn
-        for news in known.excluded:
-            assert news.ground is not None
-            grid = grid.excluding(news.ground)
-        return grid
+        if not known.excluded:
+            return self.drawn
+        return self.drawn.excluding(
+            shapely.union_all([news.ground for news in known.excluded]), known.told_mass
+        )
 
     def fly_on(self, grid: Grid) -> None:
         """Other ground may be flown over, or can be seen, now."""

@@ -52,3 +52,9 @@ def moved(start: LatLon, east_m: float, north_m: float) -> LatLon:
     lat, lon = start
     east_deg = east_m / (METRES_PER_DEGREE * narrowing(lat))
     return lat + north_m / METRES_PER_DEGREE, wrapped_deg(lon + east_deg)
+
+
+def between(start: LatLon, end: LatLon, share: float) -> LatLon:
+    """The place at a share of the way from one to another, the short way around."""
+    lon = start[1] + share * turn_deg(start[1], end[1])
+    return start[0] + share * (end[0] - start[0]), wrapped_deg(lon)

@@ -24,6 +24,7 @@ from roisearch.detection import DetectionRecord
 from roisearch.walk import MOST_S
 from roisearch.watch import LOOKED
 from service.area import Grid
+from service.area.projection import FloatArray
 from service.evidence.alarms import Alarms
 from service.evidence.cover import detection_p
 from service.evidence.observe import Observation
@@ -66,6 +67,8 @@ class Known:
 
     def __init__(self, grid: Grid, p_tp: float, p_tn: float) -> None:
         self._grid, self._rates = grid, (p_tp, p_tn)
+        self._priors: dict[frozenset[str], FloatArray] = {}
+        """The priors without what is refuted, by that: they take long on a large map."""
         self.since: float | None = None
         """Of the first word, as `time`: the prior is taken to be of then."""
         self._said: list[tuple[float, Said]] = []
@@ -75,12 +78,15 @@ class Known:
             tuple[Known, int]
         ] = []  # earlier states, the oldest first, and how much was said by then
         self._begin()
+        self.told_mass = self.belief.probability()
+        """Where the target was believed to be when news came last, float [rows, cols]: what is flown after an exclusion
+        depends on it, and has to be the same whenever it is asked for."""
 
     def _begin(self) -> None:
         """As it was before anything was seen, with the clues that stand."""
-        grid = self._grid
+        grid, assumed = self._grid, self._assumed()
         clues = [news for news in self.news if news.role == "clue"]
-        prior, outside = _with_clues(grid, clues) if clues else (grid.prior, grid.outside)
+        prior, outside = _with_clues(assumed, grid.outside, clues) if clues else (assumed, grid.outside)
         self.time: float | None = None
         """Of the last word, seconds since the epoch; None before the first, and wherever the target stands still."""
         self.belief = Belief(prior, searchable=grid.searchable, outside=outside, walk=grid.walk)
@@ -90,6 +96,15 @@ class Known:
         self.alarms = Alarms(*self._rates)
         self.confirmed: Cell | None = None
         """The place that an operator said is the target's."""
+
+    def _assumed(self) -> FloatArray:
+        """The prior of the area file, float [rows, cols], without what is refuted."""
+        refuted = frozenset(news.prior for news in self.news if news.role == "refute")
+        if not refuted:
+            return self._grid.prior
+        if refuted not in self._priors:
+            self._priors[refuted] = self._grid.prior_without(refuted)
+        return self._priors[refuted]
 
     @property
     def news(self) -> list[FieldNews]:
@@ -118,14 +133,22 @@ class Known:
         self._said.append((moment, said))
         if isinstance(said, (FieldNews, Withdrawn)):
             self._field.append(said)
-            self._kept = []
-            self._begin()
-            self._believe_all(self._said)
+            if self._moves(said):
+                self._kept = []
+                self._begin()
+                self._believe_all(self._said)
+            self.told_mass = self.belief.probability()
         elif self._is_late(moment):
             self._believe_all(self._go_back(moment))
         else:
             self._believe(said, moment)
             self._keep()
+
+    def _moves(self, said: FieldNews | Withdrawn) -> bool:
+        """Whether news, or news taken back, may change what is believed: an exclusion says nothing of the target, and
+        where that stands still the time at which it is told says nothing either."""
+        news = self.heard_as(said.id) if isinstance(said, Withdrawn) else said
+        return self._grid.walk is not None or news is None or news.role != "exclude"
 
     @property
     def kept(self) -> int:
@@ -211,21 +234,21 @@ class Known:
         return twin
 
 
-def _with_clues(grid: Grid, clues: Sequence[FieldNews]) -> tuple[NDArray[np.float64], float]:
-    """The prior of a grid, [rows, cols], and the probability outside, with the factors of clues.
+def _with_clues(
+    before: NDArray[np.float64], outside: float, clues: Sequence[FieldNews]
+) -> tuple[NDArray[np.float64], float]:
+    """A prior, [rows, cols], and the probability outside, with the factors of clues.
 
     In logarithms: a hundred clues of a thousand each are more than a number can hold. What all of them together can do
     is bounded, so that nothing that was possible becomes impossible.
     """
     with np.errstate(divide="ignore"):
-        logs = np.log(grid.prior)
+        logs = np.log(before)
         for news in clues:
             logs[news.cells[:, 0], news.cells[:, 1]] += np.log(news.values)
     peak = float(logs.max())
-    prior = np.where(grid.prior > 0.0, np.exp(np.maximum(logs - peak, -MOST_LOG_ODDS)), 0.0)
-    if grid.outside == 0.0:
+    prior = np.where(before > 0.0, np.exp(np.maximum(logs - peak, -MOST_LOG_ODDS)), 0.0)
+    if outside == 0.0:
         return prior, 0.0
-    within = (
-        math.log(float(prior.sum()) / float(grid.prior.sum()) * (1.0 - grid.outside) / grid.outside) + peak
-    )
+    within = math.log(float(prior.sum()) / float(before.sum()) * (1.0 - outside) / outside) + peak
     return prior, 1.0 / (1.0 + math.exp(min(max(within, -SUREST_LOG_ODDS), MOST_LOG_ODDS)))

@@ -129,7 +129,11 @@ def run_report(squad: Squad, area: str, settings: Settings, began: float) -> dic
     )
     place = place_known(outcome, search, found)
     flights = [each.flight for each in missions]
-    sorties = sorted((each for flight in flights for each in flight.sorties), key=lambda each: each.landed)
+    sorties = [
+        each
+        for name, mission in squad.missions.items()
+        for each in sortie_states(mission.flight.sorties, name)
+    ]
     report: dict[str, Any] = {
         "outcome": outcome,
         **place,
@@ -137,7 +141,7 @@ def run_report(squad: Squad, area: str, settings: Settings, began: float) -> dic
         "outside": search.belief.outside,
         "steps": sum(each.steps for each in flights),
         "flight_time_s": round(max(each.flight_time() for each in missions), 1),
-        "sorties": sortie_states(sorties),
+        "sorties": sorted(sorties, key=lambda each: each["landed"]),
         "pos": search.record.pos,
         "area": area,
         "coordinates": settings.run.coordinates,
@@ -182,7 +186,7 @@ def aircraft_report(name: str, mission: Mission) -> dict[str, Any]:
         "hits": len(flight.hits),
         "decisions": flight.decisions,
         "waypoints": flight.waypoints,
-        "sorties": sortie_states(flight.sorties),
+        "sorties": sortie_states(flight.sorties, name),
     }
 
 

@@ -19,10 +19,11 @@ from service.evidence.intake import Intake
 from service.evidence.moments import HISTORY_S
 from service.journal import read_meta, read_meta_if_any
 from service.known import Judgement, Withdrawn
+from service.mission.entering import still_enough
 from service.mission.flight import Flight
 from service.mission.orders import ASKED, FINISHED
-from service.mission.standing import Standing
-from service.mission.states import FINAL, FLYING, MAY_MOVE, SETTLED, Event, State
+from service.mission.standing import Standing, as_asked
+from service.mission.states import FINAL, FLYING, MAY_MOVE, SEARCHED_TO, SETTLED, Event, State
 from service.rows import (
     CommandRow,
     DecisionRow,
@@ -186,7 +187,8 @@ def why_over(journal: Path) -> str:
     for entry, row in _transitions(journal):
         states[entry.aircraft] = row.after
         why = ended.get(entry.aircraft, "")
-        ended[entry.aircraft] = "" if row.after in FLYING else _end_of(row) or why
+        goes_on = row.after in FLYING or row.event == Event.RESUME  # or is not over after all, by the news
+        ended[entry.aircraft] = "" if goes_on else _end_of(row) or why
     if any(state not in FINAL for state in states.values()):
         return ""
     finished = [why for why in ended.values() if why and why != ABORTED]
@@ -203,7 +205,9 @@ def _end_of(row: TransitionRow) -> str:
         return row.reason
     if row.event == Event.ABORT and row.reason == ASKED:
         return ABORTED
-    return FINISHED if row.event == Event.FINISH else ""
+    if row.event == Event.FINISH:
+        return FINISHED if row.reason == ASKED else row.reason
+    return ""
 
 
 def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standing:
@@ -216,8 +220,16 @@ def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standi
         if row.after in (State.READY, State.ABORTED):
             continue
         settled = standing.settled or row.event in SETTLED
-        if row.after == row.before:  # nothing but that it is settled
-            standing = replace(standing, settled=settled, searched=True, why_stopped=row.reason)
+        enough = still_enough(standing, row.event, row.after)
+        if row.after == row.before == State.WAITING:  # what was wanted before the aircraft was heard
+            standing = as_asked(standing, row.event, row.reason) or standing
+            continue
+        if row.after == row.before:  # nothing but that it is settled, or not any more
+            settled = settled and row.event != Event.RESUME
+            enough = settled and row.reason.startswith(SEARCHED_TO)
+            standing = replace(
+                standing, settled=settled, enough=enough, searched=True, why_stopped=row.reason
+            )
             continue
         if row.after in FLYING:
             standing, settled = Standing(state=row.after, why=row.reason), False
@@ -227,7 +239,7 @@ def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standi
             standing = Standing(state=row.after, why=row.reason, why_stopped=stopped, searched=searched)
         else:
             standing = replace(standing, state=row.after, why=row.reason)
-        standing = replace(standing, settled=settled)
+        standing = replace(standing, settled=settled, enough=enough)
     if standing.state == State.DONE:  # down before the search was over: whatever comes next is another flight
         return Standing()
     found = search.found()
@@ -259,6 +271,8 @@ def left_flight(journal: Path, search: Search, whose: Whose = ALONE) -> Flight:
             case FlightRow() as row:
                 flight.recall(row, entry.time)
                 flight.by = vehicle
+            case CommandRow(command="reposition", lat=float(lat), lon=float(lon)):
+                flight.goal = lat, lon
             case TransitionRow(after=state):
                 flight.flown |= state in MAY_MOVE
             case VehicleRow(system_id=system_id, autopilot=autopilot):

@@ -310,8 +310,10 @@ class NewsRow:
     def body(self) -> dict[str, Any]:
         news = self.news
         told: dict[str, Any] = {"cells": news.cells.tolist(), "values": news.values.tolist()}
-        if news.ground is not None:
-            told["ground"] = json.loads(shapely.to_geojson(news.ground))["coordinates"]
+        if news.shape is not None:
+            told["shape"] = json.loads(shapely.to_geojson(news.shape))
+        if news.prior:
+            told["prior"] = news.prior
         return {"id": news.id, "role": news.role, "words": news.words, "place": news.place, **told}
 
     @classmethod
@@ -323,12 +325,14 @@ class NewsRow:
                 f"news of the role {shown(role)} for {len(cells)} cells have {len(values)} values"
             )
         at = np.array(cells, dtype=np.int64).reshape(-1, 2)
-        drawn = body.get("ground")
-        ground = None if drawn is None else shape({"type": "MultiPolygon", "coordinates": drawn})
+        drawn, early = body.get("shape"), body.get("ground")
+        if early is not None:
+            drawn = {"type": "MultiPolygon", "coordinates": early}
+        place_of = None if drawn is None else shape(drawn)
         worth = np.array(values, dtype=np.float64)
-        return cls(
-            FieldNews(body.text("id"), cast(NewsRole, role), body.text("words"), place, at, worth, ground)
-        )
+        refuted = body.text_or_none("prior") or ""
+        said = body.text("id"), cast(NewsRole, role), body.text("words")
+        return cls(FieldNews(*said, place, at, worth, place_of, refuted))
 
 
 @dataclass(frozen=True)

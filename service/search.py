@@ -41,6 +41,7 @@ from service.ground.relief import Floats
 from service.ground.sight import seen_share
 from service.known import Known, Said
 from service.mission.energy import Left
+from service.mission.states import SEARCHED_TO
 from service.motion import MotionLimits, learnt_in_flight, limits_note, motion_of, within
 from service.outside import from_outside
 from service.reach import Reach
@@ -140,8 +141,11 @@ class Search:
         self.visibility: Floats | None = np.prod(shares, axis=0) if shares else None
         """What a look may be expected to find in each cell as a share of what it finds in the open, float [rows, cols]:
         under cover, behind ridges, and where nothing is seen for whatever reason; None: all."""
-        self.enough = self.settings.search.stop_at_pos * grid.mass_seen(self.visibility)
-        """The POS, given that the target is in the area, at which the search is at its end."""
+        seen = grid.seen(self.visibility)
+        (there, _), (_, elsewhere) = self.record.parts(seen), self.record.parts(~seen)
+        self.enough = self.settings.search.stop_at_pos * there + elsewhere
+        """The POS, given that the target is in the area, at which the search is at its end: so much of what can be seen
+        now, beside what was found out before of ground that cannot be seen any more."""
 
     def _join(self) -> None:
         """From now on there are others: they are told what this one plans, and it is told what they do."""
@@ -368,7 +372,12 @@ class Search:
         ends = self.confirmed is not None or settings.on_found == "return"
         if ends and self.found() is not None:
             return "found"
-        return f"searched to POS {sure(pos)}" if pos >= self.enough else ""
+        return f"{SEARCHED_TO} {sure(pos)}{self.left_out}" if pos >= self.enough else ""
+
+    @property
+    def left_out(self) -> str:
+        """What of the ground is given up, as the end of a sentence; empty: nothing."""
+        return f", without the ground around {self.grid.cut_off} that is cut off" if self.grid.cut_off else ""
 
     def best(self) -> Found:
         """The most likely place as it is told, with its probability and ellipse, however small that probability is."""

@@ -21,13 +21,15 @@ from service.journal import JournalLost
 from service.known import Withdrawn
 from service.mavlink import LinkError
 from service.mission.mission import Mission
-from service.mission.orders import SIGNAL
+from service.mission.orders import SIGNAL, STOPPING
 from service.mission.states import FINAL, State
 from service.news.bearing import FieldNews
 
 log = logging.getLogger("roisearch")
 LOST_S = 30.0
 """An aircraft that has been silent for so long is not waited for when all others have ended."""
+TAKING = ("resume", "return", "launch")
+"""Orders that take an aircraft from its pilot, by its name only."""
 
 
 class Squad:
@@ -148,18 +150,34 @@ class Squad:
         if aircraft is not None:
             return await self._named(aircraft).order(command, system_id=system_id)
         left = [each for each in self.missions.values() if each.state not in FINAL] or [self.leading]
-        if self.several and command == "resume" and any(each.state == State.YIELDED for each in left):
-            return OrderReceipt(
-                state=self.leading.state,
-                refused="a pilot has one of them: name the aircraft that is to resume",
-            )
         if self.several and command == "replace":
             return OrderReceipt(
                 state=self.leading.state,
                 refused="there are several: name the aircraft that another one replaces",
             )
-        receipts = await asyncio.gather(*(each.order(command, system_id=system_id) for each in left))
-        return self._answer(dict(zip(left, receipts, strict=True)))
+        if not self.several:
+            return await left[0].order(command, system_id=system_id)
+        return await self._all(command, left)
+
+    async def _all(self, command: str, left: list[Mission]) -> OrderReceipt:
+        """An order that names none: who it means nothing to does not refuse it, unless it means nothing to any.
+
+        What stops goes to all of them all the same, as it also ends what is only about to begin.
+        """
+        pilots = [each for each in left if command in TAKING and each.state == State.YIELDED]
+        asked = [each for each in left if each not in pilots]
+        meant = [each for each in asked if each.concerned(command)] or asked
+        given = asked if command in STOPPING else meant
+        receipts = await asyncio.gather(*(each.order(command) for each in given))
+        why = [
+            f"{each.name}: {said.refused}"
+            for each, said in zip(given, receipts, strict=True)
+            if said.refused and each in meant
+        ]
+        why += [
+            f"{each.name}: its pilot has it, and only an order that names it takes it back" for each in pilots
+        ]
+        return OrderReceipt(state=self.leading.state, refused="; ".join(why) or None)
 
     async def _judge(self, command: str, place: LatLon | None) -> OrderReceipt:
         """A person's word on a place: believed once, and then told to all."""
@@ -170,12 +188,6 @@ class Squad:
                 await each.judged(confirmed=command == "confirm")
         return receipt
 
-    def _answer(self, receipts: dict[Mission, OrderReceipt]) -> OrderReceipt:
-        if not self.several:
-            return next(iter(receipts.values()))
-        why = [f"{each.name}: {said.refused}" for each, said in receipts.items() if said.refused]
-        return OrderReceipt(state=self.leading.state, refused="; ".join(why) or None)
-
     def _named(self, aircraft: str) -> Mission:
         if aircraft not in self.missions:
             raise BadInput(f"there is no aircraft {shown(aircraft)}; there is {', '.join(self.missions)}")
@@ -185,7 +197,8 @@ class Squad:
         """News from the field, or news taken back. Raises BadInput, JournalLost."""
         if isinstance(said, FieldNews) and said.role == "exclude":
             for each in self.missions.values():
-                each.core.chart.refuse_over_home(said.ground, each.vehicle.telemetry)
+                if each.state not in FINAL:
+                    each.core.chart.refuse_over_home(said.ground, each.vehicle.telemetry, each.name)
         first = self.leading
         await first.hear(said)
         for each in self.missions.values():
@@ -234,7 +247,7 @@ class Squad:
 def _lost(mission: Mission) -> bool:
     """Silent for long; on the ground between two sorties it may be switched off, and is waited for as the settings
     say."""
-    if mission.state == State.GROUNDED:
+    if mission.core.between_sorties:
         return False
     age = mission.clock.now() - mission.vehicle.telemetry.heartbeat_time
     return age > max(LOST_S, mission.core.terms.heartbeat_fresh_s)

@@ -146,7 +146,7 @@ class FlightSoFar:
         self._in_the_air = said.after in IN_THE_AIR
         if self._in_the_air and self.began is None:
             self.began = now
-        if said.after in FLYING:
+        if said.after in FLYING or said.event == Event.RESUME:
             self.stopped_by = None
         elif said.after == State.RETURNING or said.after in FINAL:
             self._stop(said.event, said.reason)

@@ -26,6 +26,7 @@ from roisearch.planners.puct.presets import settings_for
 from roisearch.watch import LOOKED
 from service.errors import Parser
 from sim.bench_memory import table as memory_table
+from sim.bench_news import line as news_line
 from sim.bench_regions import COST_AT_MOST, FEW, LOSS_AT_MOST, MANY, bounded_choice
 from sim.bench_start import table as start_table
 from sim.twin import TwinBelief, TwinPlanner
@@ -400,6 +401,8 @@ def main(arguments: list[str]) -> int:
     say(memory_table())
     say("")
     say(start_table(options.largest))
+    say("")
+    say(news_line())
     say("")
     for target, met in targets:
         say(f"{'met   ' if met else 'MISSED'} {target}")

@@ -2,7 +2,8 @@
 
 Each flight is one service with a link to each of N mocks of both flavours in turn (system ids 1 to N, a few metres from
 one another at the launch point), a detector for each, and a target drawn from the prior. Their true places are compared
-all the time (see `separation`). With `--trouble` the link of one of them is cut for good in the middle of the search.
+all the time (see `separation`). They are in lockstep: the first mock keeps the time of all. With `--trouble` something
+befalls one of them in the middle of the search, by the seed: see `TROUBLES`.
 
 A flight is good when it ends FOUND, where the target is, with no two aircraft too near, in the air and on the way down.
 """
@@ -29,6 +30,7 @@ from sim.autopilot.process import AutopilotProcess
 from sim.flight_campaign import GOES_ON, add_options, alike, check_areas, kept, seeds_of
 from sim.progress import Rest
 from sim.separation import Separation, Watching, side_by_side
+from sim.soak.process import Process
 from sim.sorties import gone_at_the_end
 from sim.target import draw_target
 
@@ -38,6 +40,11 @@ STARTS_M = 6.0
 CUT_AFTER = 15
 """Steps of all together after which a link is cut."""
 WITHIN_CELLS = 1.5
+TROUBLES = ("its link is cut", "the service is killed", "a pilot takes it", "its failsafe brings it home")
+"""What befalls one of them: its link is cut for good, the service is killed and goes on with all, a pilot has it for a
+while and an operator takes it back, or its autopilot flies it home and lands it for good."""
+PILOT_S = 20.0
+"""So long, in seconds of the vehicle's clock, a pilot has it."""
 SEARCHES = ("SEARCHING", "CONFIRMING")
 SETTINGS = {
     "ROISEARCH_FLIGHT_MAX_FLIGHT_S": "36000",
@@ -48,7 +55,7 @@ SETTINGS = {
 
 @dataclass(frozen=True)
 class Together:
-    """One search to fly: its area, how many fly it, and whether one of them loses its link."""
+    """One search to fly: its area, how many fly it, and whether something befalls one of them."""
 
     area: Path
     aircraft: int
@@ -56,6 +63,11 @@ class Together:
     trouble: bool
     speedup: float
     patience_s: float
+
+    @property
+    def trouble_kind(self) -> str:
+        """What befalls one of them, if anything does."""
+        return str(np.random.default_rng((self.seed, 1)).choice(TROUBLES)) if self.trouble else ""
 
 
 @dataclass
@@ -70,6 +82,7 @@ class JointOutcome:
     nearest_m: float = math.inf
     together: int = 0
     cut: str = ""
+    """Whom the trouble befell."""
     error_cells: float = math.inf
 
     @property
@@ -91,8 +104,10 @@ class JointFlight:
             folder / "runs",
         )
         folder.mkdir(parents=True, exist_ok=True)
+        self._folder, self.lockstep = folder, folder / "time"
         self.names = [str(number) for number in range(1, search.aircraft + 1)]
         self.judge = Separation()
+        self._detectors: list[Process] = []
         self._hide()
 
     def _hide(self) -> None:
@@ -116,34 +131,34 @@ class JointFlight:
         controls = {name: str(mock.control) for name, mock in mocks.items()}
         self._watching = enter(Watching(controls, self.judge))
         self._controls = {name: Control(url) for name, url in controls.items()}
-        words = ["service", "--area", str(search.area), "--runs", str(self._runs), "--takeoff"]
-        words += [
-            "--speedup",
-            f"{search.speedup:g}",
-            "--http",
-            "127.0.0.1:0",
-            "--seed",
-            str(search.seed),
-            "--flat",
-        ]
+        words = ["--area", str(search.area), "--runs", str(self._runs), "--seed", str(search.seed), "--flat"]
         for mock in mocks.values():
             words += ["--connect", mock.url.replace("udpin", "udpout")]
-        self.service = enter(gone_at_the_end(words, SETTINGS))
+        self._serve([*words, "--takeoff"])
+
+    def _serve(self, words: list[str]) -> None:
+        """Start a service, and a detector of each aircraft."""
+        search, enter = self.search, self._stack.enter_context
+        words = ["service", *words, "--speedup", f"{search.speedup:g}", "--http", "127.0.0.1:0"]
+        self.service = enter(
+            gone_at_the_end(words, {**SETTINGS, "ROISEARCH_LINK_LOCKSTEP": str(self.lockstep)})
+        )
         address = self.service.wait_for(r"listening on (http://\S+)", search.patience_s)[1]
         self._door = enter(httpx.Client(base_url=address, timeout=60.0))
-        for name in self.names:
-            enter(gone_at_the_end(self._detector(address, name)))
+        for each in self._detectors:  # that reported to the service before this one
+            each.stop()
+        self._detectors = [enter(gone_at_the_end(self._detector(address, name))) for name in self.names]
 
     def _mock(self, number: int, start: tuple[float, float]) -> AutopilotProcess:
         options = [f"--home={start[0]:.7f},{start[1]:.7f},400", "--sysid", str(number)]
         options += ["--seed", str(10 * self.search.seed + number), "--endurance", "600"]
-        options += ["--control", "127.0.0.1:0"]
+        options += ["--control", "127.0.0.1:0", "--lockstep", str(self.lockstep)]
         flavor = FLAVORS[(number - 1) % len(FLAVORS)]
         return AutopilotProcess(flavor, speedup=self.search.speedup, options=options)
 
     def _detector(self, address: str, name: str) -> list[str]:
         words = ["sim", "detector", "--attached", "--service", address, "--aircraft", name]
-        words += ["--seed", str(100 * self.search.seed + int(name))]
+        words += ["--seed", str(100 * self.search.seed + int(name)), "--lockstep", str(self.lockstep)]
         return [*words, f"--target={self.target[0]:.7f},{self.target[1]:.7f}"]
 
     def waits(self, until: Callable[[dict[str, Any]], bool]) -> bool:
@@ -160,8 +175,8 @@ class JointFlight:
             time.sleep(0.2)
         return False
 
-    def cut(self) -> None:
-        """Cut the link of one that searches, once all have searched for a while, for good."""
+    def befalls(self) -> None:
+        """Let trouble come to one that searches, once all have searched for a while."""
         name = self.names[self.search.seed % len(self.names)]
 
         def in_the_middle(told: dict[str, Any]) -> bool:
@@ -170,8 +185,45 @@ class JointFlight:
             return steps >= CUT_AFTER and states[name] in SEARCHES
 
         if self.waits(in_the_middle):
-            self._controls[name].fault("link_lost")
             self.flown.cut = name
+            trouble = self.search.trouble_kind
+            if trouble == "the service is killed":
+                self._kill()
+            elif trouble == "a pilot takes it":
+                self._lend(name)
+            else:
+                self._controls[name].fault("link_lost" if trouble == "its link is cut" else "failsafe")
+
+    def _kill(self) -> None:
+        """kill -9, and a service that goes on with the run."""
+        for control in self._controls.values():
+            control.speedup(1.0)  # a computer that starts does so in its own time
+        self.service.process.kill()
+        self.service.process.wait()
+        (run,) = (path.parent for path in self._runs.glob("*/journal.sqlite"))
+        self._serve(["--resume", str(run)])
+        for control in self._controls.values():
+            control.speedup(self.search.speedup)
+
+    def _lend(self, name: str) -> None:
+        """A pilot has it for a while; then an operator takes it back, by its name."""
+        control = self._controls[name]
+        control.fault("pilot")
+
+        def is_in(*states: str) -> Callable[[dict[str, Any]], bool]:
+            return lambda told: any(
+                each["name"] == name and each["state"] in states for each in told["aircraft"]
+            )
+
+        if not self.waits(is_in("YIELDED")):
+            return
+        until = control.state()["time"] + PILOT_S
+        if self.waits(lambda told: control.state()["time"] >= until):
+            control.clear("pilot")
+            for order in ("resume", "return"):  # a search that is over by now is not gone on with
+                answer = self._door.post("/api/commands", json={"command": order, "aircraft": name})
+                if not answer.raise_for_status().json().get("refused"):
+                    return
 
     def end(self) -> JointOutcome:
         """Wait for the end and judge it."""
@@ -182,7 +234,8 @@ class JointFlight:
         if place := flown.report.get("position"):
             at = self._frame.to_metres([(place["lat"], place["lon"]), self.target])
             flown.error_cells = float(np.hypot(*(at[0] - at[1]))) / self._frame.cell_m
-        aloft = [name for name, state in self._watching.last.items() if state["armed"] and name != flown.cut]
+        lost = flown.cut if self.search.trouble_kind == TROUBLES[0] else ""
+        aloft = [name for name, state in self._watching.last.items() if state["armed"] and name != lost]
         if aloft:
             flown.wrong.append(f"the service has ended while aircraft {', '.join(aloft)} fly")
         return flown
@@ -195,7 +248,7 @@ def fly(search: Together, folder: Path) -> JointOutcome:
         try:
             flight.begin()
             if search.trouble:
-                flight.cut()
+                flight.befalls()
             flight.end()
         except (AssertionError, httpx.HTTPError, ValueError) as error:
             flight.flown.wrong.append(str(error))
@@ -218,7 +271,7 @@ def told(flown: JointOutcome) -> str:
     line = f"{search.area.stem} seed {search.seed}, {search.aircraft} aircraft: exit {flown.code}, "
     line += f"{flown.report.get('outcome', 'no report')}, {flown.error_cells:.2f} cells off, {nearest}, "
     line += f"{len(flown.violations)} violations" + (
-        f", the link of {flown.cut} was cut" if flown.cut else ""
+        f", aircraft {flown.cut}: {search.trouble_kind}" if flown.cut else ""
     )
     return "\n".join([line, *flown.wrong, *(f"VIOLATION: {each}" for each in flown.violations)])
 
@@ -230,7 +283,7 @@ def main(arguments: Sequence[str]) -> int:
     )
     parser.add_argument("areas", nargs="+", type=Path, metavar="AREA", help="area files")
     parser.add_argument("--aircraft", type=int, required=True, metavar="N", help="how many fly each search")
-    parser.add_argument("--trouble", action="store_true", help="cut the link of one in the middle, for good")
+    parser.add_argument("--trouble", action="store_true", help="something befalls one, by the seed")
     add_options(parser, "area", speedup=10.0, patience_s=900.0)
     options = parser.parse_args(arguments)
     check_areas(parser, options.areas)

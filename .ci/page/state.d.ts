@@ -30,6 +30,7 @@ interface AircraftState {
   ahead: [number, number][];
   steps: number;
   flight_time_s: number;
+  sorties: SortieState[];
   pose: PoseState | null;
   footprint: FootprintState;
 }
@@ -94,6 +95,11 @@ interface FoundState {
   confirmed: boolean;
 }
 
+interface GeometryState {
+  type: string;
+  coordinates: any[];
+}
+
 interface GoalState {
   pos: number;
   reached: boolean;
@@ -113,6 +119,7 @@ interface NewsState {
   lat: number;
   lon: number;
   cells: number;
+  geometry: GeometryState | null;
 }
 
 interface NextState {
@@ -145,7 +152,7 @@ interface PoseState {
   lon: number;
   written: string;
   height_m: number;
-  heading_deg: number;
+  heading_deg: number | null;
   time: number;
   pitch_deg: number;
   roll_deg: number;
@@ -216,6 +223,7 @@ interface RunState {
 
 interface SortieState {
   number: number;
+  aircraft: string;
   landed: number;
   flight_time_s: number;
   steps: number;

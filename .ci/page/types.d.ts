@@ -25,6 +25,7 @@ type LayerName =
   | "ahead"
   | "hits"
   | "area"
+  | "news"
   | "tiles";
 
 /** The grid: corners north-west first, clockwise. */
@@ -71,6 +72,8 @@ interface Scene {
   drawn: number;
   /** Names of the area file, and where they belong. */
   places: { name: string; role: string; lat: number; lon: number }[];
+  /** What people call the parts of the area file's prior. */
+  priors: string[];
   /** How the team writes places. */
   coordinates: string;
   outside: number;

@@ -27,6 +27,7 @@ NAMES = ("name", "title", "description")
 _PHRASES = frozenset({*lost_persons.SUBJECTS, *lost_persons.TERRAINS, *COVER_KINDS})
 """Values of more than one word, some of them."""
 
+_NAMED = re.compile(r'\("(.*)"\)$', re.DOTALL)
 _TAG = re.compile(r"<[^<>]{0,2000}>")  # one that begins another is none: each sign is looked at once
 _KIND = re.compile(r": (?:left out, |taken as ).*$")
 _SETTING = re.compile(
@@ -79,6 +80,12 @@ class Document:
 def label(kind: str, number: int, name: str = "") -> str:
     """How messages call the part of a file with a number from 0."""
     return f'{kind} {number + 1} ("{one_line(name)}")' if name else f"{kind} {number + 1}"
+
+
+def name_in(label: str) -> str:
+    """What a person called a part of a file, from what messages call it (`document.label`); empty: nothing."""
+    found = _NAMED.search(label)
+    return found.group(1) if found else ""
 
 
 def one_line(value: object, most: int = 80) -> str:

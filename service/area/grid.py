@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -12,9 +13,10 @@ from scipy import ndimage
 
 from service.area import route
 from service.area.checks import check_launch
+from service.area.document import name_in
 from service.area.frame import BoolArray, GridFrame, lay_frame
 from service.area.geojson import Where
-from service.area.model import SearchArea, TargetMotion
+from service.area.model import Prior, SearchArea, TargetMotion, prior_shape
 from service.area.prior import area_prior, cell_squares, covered_fraction
 from service.area.projection import FloatArray, surface_m2
 from service.area.route import KeepOut
@@ -83,6 +85,10 @@ class Grid:
     target: TargetMotion | None = None
     mobility: FloatArray | None = None
     coordinates: Coordinates = "degrees"
+    area: SearchArea | None = None
+    """What the prior was made from; None: it is not that of an area file."""
+    cut_off: str = ""
+    """Where the ground is that exclusions told in flight have cut off, for people; empty: there is none."""
 
     @property
     def walk(self) -> "Walk | None":
@@ -108,8 +114,11 @@ class Grid:
 
     def mass_seen(self, visibility: FloatArray | None) -> float:
         """The same where a look finds such a part, [rows, cols], of what it finds in the open; None: all."""
-        seen = self.flyable if visibility is None else self.flyable & (visibility >= NEEDS_A_TEAM)
-        return float(self.prior[seen].sum())
+        return float(self.prior[self.seen(visibility)].sum())
+
+    def seen(self, visibility: FloatArray | None) -> BoolArray:
+        """The flyable cells, bool [rows, cols], where a look finds what is worth a search from above."""
+        return self.flyable if visibility is None else self.flyable & (visibility >= NEEDS_A_TEAM)
 
     @functools.cached_property
     def _flyable_cells(self) -> NDArray[np.int64]:
@@ -175,8 +184,11 @@ class Grid:
         """The same grid with one more sentence for the operator."""
         return replace(self, layout_notes=(*self.layout_notes, note))
 
-    def excluding(self, shape: shapely.Geometry) -> "Grid":
+    def excluding(self, shape: shapely.Geometry, mass: FloatArray | None = None) -> "Grid":
         """The same grid with one more exclusion (degrees, x = longitude), which keeps its mass but is not flown over.
+
+        Of several parts that it leaves the one with the most of `mass` stays, float [rows, cols]: where the target may
+        be by now; None: as the prior has it.
 
         Raises:
             BadInput: it leaves nothing to fly over, closes the way from the launch point, or has too many corners.
@@ -187,16 +199,28 @@ class Grid:
         allowed = self.flyable & ~shapely.intersects(blocked.zone.prepared, cell_squares(self.frame))
         if not allowed.any():
             raise where.bad("it leaves no cell to fly over; make it smaller")
+        mass = self.prior if mass is None else mass
         flyable, _, notes = _reachable_part(
-            self.frame, allowed, self.prior, blocked, self.launch, where, self.coordinates
+            self.frame, allowed, mass, blocked, self.launch, where, self.coordinates
         )
         start = nearest_flyable(self.frame, flyable, self.launch)
+        lost, place = allowed & ~flyable, ""
+        if lost.any():
+            row, col = np.unravel_index(np.argmax(np.where(lost, mass, -1.0)), lost.shape)
+            lat, lon = self.frame.to_latlon([(row, col)])[0]
+            place = written((float(lat), float(lon)), self.coordinates)
+            whole = float(mass.sum())
+            notes = (
+                f"exclusions cut off ground around {place}, where {share(float(mass[lost].sum()) / whole)} of the "
+                f"probability lies: it is not flown, what has {share(float(mass[flyable].sum()) / whole)} is",
+            )
         return replace(
             self,
             flyable=_frozen(flyable),
             keep_out=blocked,
             start=start,
             layout_notes=self.layout_notes + notes,
+            cut_off=place,
         )
 
     def with_prior(self, prior: ArrayLike) -> "Grid":
@@ -210,7 +234,26 @@ class Grid:
             raise BadInput(
                 "the prior has no mass on any cell that is searched; give one that covers the area."
             )
-        return replace(self, prior=_frozen(mass / mass.sum()))
+        return replace(self, prior=_frozen(mass / mass.sum()), area=None)
+
+    @functools.cached_property
+    def prior_places(self) -> dict[str, LatLon]:
+        """The parts of the area file's prior by what people call them, with the middle of each, in the file's order."""
+        parts = () if self.area is None else self.area.priors
+        middles = {_called(part): prior_shape(part).centroid for part in parts}
+        return {name: (float(middle.y), float(middle.x)) for name, middle in middles.items()}
+
+    def prior_without(self, names: Collection[str]) -> FloatArray:
+        """The prior, float [rows, cols], as it would be without the parts of these names in the area file."""
+        assert self.area is not None
+        priors = tuple(part for part in self.area.priors if _called(part) not in names)
+        area, squares = replace(self.area, priors=priors), cell_squares(self.frame)
+        return _frozen(area_prior(area, self.frame, squares, self.covered, self.searchable, self.mobility))
+
+
+def _called(part: Prior) -> str:
+    """What people call a part of the prior."""
+    return name_in(part.label) or part.label
 
 
 def build_grid(
@@ -300,6 +343,7 @@ def build_grid(
         outline=outline,
         layout_notes=crossed + notes,
         clearance_m=clearance_m,
+        area=area,
         target=area.target,
         coordinates=coordinates,
     )

@@ -57,6 +57,16 @@ class RingPrior:
 
 Prior = PolygonPrior | PointPrior | LinePrior | RingPrior
 
+
+def prior_shape(prior: Prior) -> shapely.Geometry:
+    """Where a prior is, in degrees, x = longitude."""
+    if isinstance(prior, PolygonPrior):
+        return prior.polygon
+    if isinstance(prior, LinePrior):
+        return prior.line
+    return shapely.Point(prior.position[1], prior.position[0])
+
+
 RING_MASS = (0.25, 0.25, 0.25, 0.20, 0.05)
 """Of the rings up to the quantiles 25, 50, 75 and 95 %, and of what lies beyond."""
 BEYOND = 2.0

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from service.area.document import name_in
 from service.area.prior import cell_squares
 from service.export.gaps import find_gaps
 from service.export.model import ExportedFind, ExportedRun, Fix
@@ -78,7 +79,8 @@ def _ground(run: ExportedRun) -> Iterable[PlacedItem]:
     yield PlacedItem("search", area.name, area.polygon)
     for number, exclusion in enumerate(area.exclusions, 1):
         facts = {"searchable": exclusion.searchable}
-        yield PlacedItem("exclude", f"exclusion {number}", exclusion.polygon, facts=facts)
+        called = f"exclusion {number}" + (f", {name}" if (name := name_in(exclusion.label)) else "")
+        yield PlacedItem("exclude", called, exclusion.polygon, facts=facts)
     yield PlacedItem("launch", "launch", _point(*run.grid.launch))
 
 

@@ -79,6 +79,8 @@ class ExportedRun:
 
     Attributes:
         name: of its folder.
+        area: as drawn in its file, and excluded since.
+        grid: with what may be flown over as it stands in the end.
         belief: after all that was reported.
         pod: cumulative probability of detection, cell by cell.
         labels: regions of interest, 0 for none.

@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from service.chances import sure
 from service.config import Settings, each_aircraft
 from service.entries import Entry, understanding
 from service.evidence.found import Found
 from service.export.model import ExportedFind, ExportedRun, Fix, PlacedDetection, TimelineEntry
+from service.export.timeline import timeline
 from service.mission.states import Event
-from service.places import Coordinates, written
+from service.news.bearing import as_exclusion
 from service.resume import retrace, stored_run
-from service.rows import CommandRow, FoundRow, ModeRow, OrderRow, ReportRow, TransitionRow, VerdictRow
+from service.rows import CommandRow, FoundRow, ReportRow, TransitionRow
 from service.search import Search
 from service.story import StoriesSoFar
 from service.survey import JOURNAL
@@ -44,12 +44,11 @@ def read_run(folder: Path) -> ExportedRun:
             curve.add(entry.time, search.record.pos)
         elif isinstance(entry.said, FoundRow):
             finds.append(_find(entry.time, entry.said.found))
-    how = settings.run.coordinates
     reports = [entry for entry in entries if isinstance(entry.said, ReportRow)]
     return ExportedRun(
         name=folder.resolve().name,
-        area=area,
-        grid=grid,
+        area=replace(area, exclusions=(*area.exclusions, *map(as_exclusion, search.known.excluded))),
+        grid=search.grid,
         settings=settings,
         belief=search.belief,
         pod=search.record.pod(),
@@ -58,14 +57,16 @@ def read_run(folder: Path) -> ExportedRun:
         looks=search.record.looks,
         reports=len(reports),
         curve=tuple(curve.points),
-        track=_track(reports, sorted(s.landed for each in stories.flights.values() for s in each.sorties)),
+        track=_track(
+            reports,
+            {name: [each.landed for each in flight.sorties] for name, flight in stories.flights.items()},
+        ),
         hits=tuple(stories.hits),
         detections=tuple(each for entry in reports for each in _detections(entry)),
         find=replace(finds[-1], confirmed=search.confirmed is not None)
         if finds and stories.found is not None
         else None,
-        timeline=tuple(moment for entry in entries for moment in _moment(entry, how))
-        or (_first(entries[0]),),
+        timeline=tuple(timeline(entries, settings)) or (_first(entries[0]),),
         autopilot=_autopilot(entries),
         launch_amsl_m=_launch_amsl_m(entries, settings) if grid.relief is None else grid.relief.launch_amsl_m,
         state=stories.leading.state.value,
@@ -80,12 +81,17 @@ def _fix(entry: Entry) -> Iterable[Fix]:
         yield Fix(pose.time, pose.lat, pose.lon, pose.height_m, pose.heading_deg, entry.aircraft)
 
 
-def _track(reports: Sequence[Entry], landed: Sequence[float]) -> tuple[tuple[Fix, ...], ...]:
-    """The pieces of all aircraft, one aircraft after the other."""
+def _track(reports: Sequence[Entry], landed: Mapping[str, Sequence[float]]) -> tuple[tuple[Fix, ...], ...]:
+    """The pieces of all aircraft, one aircraft after the other; `landed` are the landings of each by its name."""
     fixes = [fix for entry in reports for fix in _fix(entry)]
-    names = dict.fromkeys(fix.aircraft for fix in fixes)
+    first = next(iter(landed))  # what was written while it flew alone has no name
+    own: dict[str, list[Fix]] = {}
+    for fix in fixes:
+        own.setdefault(fix.aircraft, []).append(fix)
     return tuple(
-        piece for name in names for piece in _pieces((fix for fix in fixes if fix.aircraft == name), landed)
+        piece
+        for name, flown in own.items()
+        for piece in _pieces(flown, sorted(landed.get(name, landed[first])))
     )
 
 
@@ -138,25 +144,6 @@ def _find(time: float, found: Found) -> ExportedFind:
     around = found.ellipse
     ellipse = (around["semi_major_m"], around["semi_minor_m"], around["bearing_deg"])
     return ExportedFind(time, found.lat, found.lon, found.probability, found.sigma_m, ellipse)
-
-
-def _moment(entry: Entry, how: Coordinates) -> Iterable[TimelineEntry]:
-    """What belongs into the timeline, and of which aircraft it is; decisions and waypoints are too many."""
-    whose = f"aircraft {entry.aircraft}: " if entry.aircraft else ""
-    match entry.said:
-        case TransitionRow(before=before, after=after, reason=reason):
-            yield TimelineEntry(entry.time, "state", f"{whose}{before} → {after}: {reason}")
-        case OrderRow(command=command):
-            yield TimelineEntry(entry.time, "order", f"{whose}operator: {command}")
-        case VerdictRow(confirmed=confirmed):
-            yield TimelineEntry(
-                entry.time, "verdict", f"operator: {'it is' if confirmed else 'it is not'} here"
-            )
-        case ModeRow(mode=mode, commanded=False):
-            yield TimelineEntry(entry.time, "mode", f"{whose}the autopilot changed to {mode}")
-        case FoundRow(found=found):
-            place = written((found.lat, found.lon), how)
-            yield TimelineEntry(entry.time, "found", f"found at {place}, {sure(found.probability)} sure")
 
 
 def _first(entry: Entry) -> TimelineEntry:

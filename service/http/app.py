@@ -154,7 +154,7 @@ def create_app(
 
     @app.post(
         "/api/news",
-        summary="Tell news from the field: a clue, or ground that others have searched",
+        summary="Tell news from the field: a clue, ground that others have searched, ground not to fly over any more",
         response_model=HeardState,
         responses=examples.HEARD,
     )
@@ -165,7 +165,7 @@ def create_app(
         return await run.hear(feature)
 
     @app.post(
-        "/api/news/{name}/withdraw",
+        "/api/news/{name:path}/withdraw",
         summary="Take news back: the belief is then what it would be had they never come",
         response_model=HeardState,
         responses=examples.HEARD,

@@ -58,7 +58,7 @@ def answers(value: Any, *codes: int) -> Responses:
 
 RECEIPTS = answers([{"id": "cam-000117", "status": "accepted", "reason": "", "looks": 1, "hits": 0}], *POSTED)
 ORDERED = answers({"state": "HOLDING"}, *POSTED)
-HEARD = answers({"id": "news-1", "status": "accepted", "cells": 37}, *POSTED)
+HEARD = answers({"id": "news-1", "status": "accepted", "cells": 37, "notes": []}, *POSTED)
 STATE = answers(
     {
         "state": "SEARCHING",

@@ -43,6 +43,9 @@ ORDERS = "/api/commands"
 STOPS = ("hold", "return", "finish", "abort")
 """Orders that stop the aircraft or bring it home."""
 MAPS = frozenset({"/api/map", "/api/map.png"})
+JSON_KINDS = ("application/json",)
+GEOJSON_KINDS = {"/api/news": (*JSON_KINDS, "application/geo+json")}
+"""What else a body may be called, by its path: no script of another site can send this unasked either."""
 MAY = "roisearch.scope"
 """Under this name the ASGI scope says what the token of a request opens."""
 
@@ -121,7 +124,8 @@ class Guard:
             self._check_rate(scope)
             kind = _kind(scope["path"])
             with self._slots.taken(kind, scope):
-                body = await self._body(headers, incoming)
+                kinds = GEOJSON_KINDS.get(scope["path"], JSON_KINDS)
+                body = await self._body(headers, incoming, kinds)
                 if kind != "bodies":
                     await self._pass_on(scope, receive if body is None else _replay(body, receive), send)
             if kind == "bodies":  # whoever gives an order has told it by now
@@ -218,7 +222,7 @@ class Guard:
         if wait:
             raise too_many(per_s, wait)
 
-    async def _body(self, headers: Headers, incoming: _Incoming) -> bytes | None:
+    async def _body(self, headers: Headers, incoming: _Incoming, kinds: Sequence[str]) -> bytes | None:
         """The whole body, within its limits; None when there is none."""
         if not _announces_body(headers):
             return None
@@ -230,8 +234,8 @@ class Guard:
         if length and int(length) > most:
             raise too_large
         kind = headers.get("content-type", "").partition(";")[0].strip().lower()
-        if kind != "application/json":
-            raise Refusal(415, "a body is JSON: send Content-Type: application/json")
+        if kind not in kinds:
+            raise Refusal(415, f"a body is JSON: send Content-Type: {' or '.join(kinds)}")
         body = bytearray()
         try:
             async with asyncio.timeout(self._http.body_timeout_s):

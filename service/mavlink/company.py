@@ -13,8 +13,11 @@ from collections import deque
 from service.mavlink.command import command_name
 from service.mavlink.framing import Message
 
-_MOTION_COMMANDS = frozenset({16, 17, 20, 21, 22, 176, 186, 192, 193, 252, 300})
-"""MAV_CMD: NAV_*, DO_SET_MODE, DO_CHANGE_ALTITUDE, DO_REPOSITION, DO_PAUSE_CONTINUE, OVERRIDE_GOTO, MISSION_START."""
+TAKES = frozenset({178, 192, 193})
+"""MAV_CMD by which whoever sends one flies the aircraft himself, and changes no mode: DO_CHANGE_SPEED, DO_REPOSITION,
+DO_PAUSE_CONTINUE."""
+_MOTION_COMMANDS = TAKES | {16, 17, 20, 21, 22, 176, 186, 252, 300}
+"""The same, NAV_*, DO_SET_MODE, DO_CHANGE_ALTITUDE, OVERRIDE_GOTO, MISSION_START."""
 _LATELY_S = 10.0
 _TOLD_AGAIN_S = 60.0
 _SURE_AFTER = 2

@@ -24,6 +24,7 @@ from service.mavlink import gates
 from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.autopilots.registry import autopilot_for
 from service.mavlink.command import Command, result_name, set_message_interval
+from service.mavlink.company import TAKES
 from service.mavlink.errors import NotPermitted
 from service.mavlink.events import (
     AnotherService,
@@ -150,10 +151,12 @@ class LinkCore(LinkMemory):
         Raises:
             NotPermitted: it is not ours to move now, or the place is not one to fly to. Nothing was sent.
         """
+        return self._go_to(Target(lat, lon, alt_amsl_m), now, stops=False)
+
+    def _go_to(self, target: Target, now: float, *, stops: bool) -> Target:
         self._wake(now)
-        target = Target(lat, lon, alt_amsl_m)
         reason = self.why_not_reposition(now) or gates.why_not_there(self.telemetry, self.settings, target)
-        if reason is None and self._strangers.suspect is not None:
+        if reason is None and not stops and self._strangers.suspects(now):
             reason = "somebody else may just have given the aircraft a target"
         if reason is not None:
             raise NotPermitted(f"no waypoint was sent: {reason}")
@@ -177,7 +180,7 @@ class LinkCore(LinkMemory):
             raise NotPermitted("no waypoint was sent: the position of the aircraft is not known")
         stop = stopping_point(t, autopilot.stopping_distance_m(t.ground_speed_mps))
         altitude = max(stop.alt_amsl_m, least_amsl_m) if math.isfinite(least_amsl_m) else stop.alt_amsl_m
-        self.reposition(stop.lat, stop.lon, altitude, now)
+        self._go_to(replace(stop, alt_amsl_m=altitude), now, stops=True)
 
     def brake(self, now: float) -> None:
         """Stop where it can, without a position of ours: the autopilot's own way; see `hold` for what ends with it.
@@ -392,6 +395,9 @@ class LinkCore(LinkMemory):
         reason = self._company.on_ack(message, ours=named == us, now=now) if named[1] else ""
         self._tell_another(reason, now)
         if named not in ((0, 0), (us[0], 0), us):
+            t, accepted = self.telemetry, message.result == mavlink.MAV_RESULT_ACCEPTED
+            if accepted and message.command in TAKES and t.in_control and t.guided and t.armed:
+                self._replaced(None, self._company.commander(now), now)
             return
         self._hearing.on_answer()
         if message.command == mavlink.MAV_CMD_DO_REPOSITION:
@@ -445,11 +451,16 @@ class LinkCore(LinkMemory):
         if stranger is not None:
             failsafe = any("failsafe" in text.lower() for text in self._lately_said(now))
             by = "the autopilot's failsafe" if failsafe else self._company.commander(now)
-            self._watch.clear()
-            self._control.lose(f"{by} has given the aircraft another target")
-            self._stand_down("the aircraft was given another target", now)
-            self._strangers.start_over()
-            self._events.append(TargetReplaced(now, target, stranger, by))
+            self._replaced(stranger, by, now)
+
+    def _replaced(self, found: Target | None, by: str, now: float) -> None:
+        """Somebody else sends it somewhere, or has it do something else: it is theirs."""
+        ours = self._watch.target
+        self._watch.clear()
+        self._control.lose(f"{by} has given the aircraft another target")
+        self._stand_down("the aircraft was given another target", now)
+        self._strangers.start_over()
+        self._events.append(TargetReplaced(now, ours, found, by))
 
     def _heard_texts(self, texts: list[StatusText], now: float) -> None:
         for text in texts:
@@ -505,7 +516,7 @@ class LinkCore(LinkMemory):
 
     def _push_target(self, now: float) -> None:
         step, target = self._watch.due(now), self._watch.target
-        if step is None or target is None or self._strangers.suspect is not None:
+        if step is None or target is None or self._strangers.suspects(now):
             return  # who may just have given it another is not overridden by a repetition either
         reason = self.why_not_reposition(now)
         if step is Step.RESEND and reason is None:

@@ -164,7 +164,8 @@ class TargetReplaced:
     time: float
     target: Target | None
     """The last one of ours, if one was under way."""
-    found: Target
+    found: Target | None
+    """Theirs; None where only the answer to their command was heard."""
     by: str
     """Who it was, as a sentence's subject, as far as that can be told."""
 

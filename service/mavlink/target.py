@@ -26,6 +26,7 @@ from service.mavlink.events import Target
 _REFUSAL_S = 0.5
 _REPLACED_AFTER = 2
 _SETTLED_AFTER = 3
+_SUSPECTED_S = 5.0
 _OVERTAKES_S = (
     1.0  # so long may a waypoint be on its way, while the autopilot names what somebody else gave it before
 )
@@ -80,10 +81,10 @@ class Strangers:
         self._sent_at = self._suspect_at = -math.inf
         self._off_until = -math.inf
 
-    @property
-    def suspect(self) -> Target | None:
-        """A place that is not ours and was named lately, but not often enough to be sure."""
-        return self._suspect
+    def suspects(self, now: float) -> bool:
+        """A place that is not ours was named lately, but not often enough to be sure; when nothing is named any more,
+        that is no reason for ever."""
+        return self._suspect is not None and now - self._suspect_at < _SUSPECTED_S
 
     def look_away(self, until: float) -> None:
         """We have asked for another mode, whose target it may name before its heartbeat shows the mode."""

@@ -201,7 +201,10 @@ def after_reboot(t: Telemetry) -> Telemetry:
 
 
 def stopping_point(t: Telemetry, distance_m: float) -> Target:
-    """The place that lies this far ahead on the present course, at the present altitude."""
+    """The place that lies this far ahead on the present course, at the present altitude; here, where that is not known
+    or it stands."""
+    if not t.ground_speed_mps > 0.5:
+        return Target(t.lat, t.lon, t.alt_amsl_m)
     north, east, _ = t.velocity_ned_mps
-    ahead_s = distance_m / t.ground_speed_mps if t.ground_speed_mps > 0.5 else 0.0
+    ahead_s = distance_m / t.ground_speed_mps
     return Target(*moved((t.lat, t.lon), ahead_s * east, ahead_s * north), t.alt_amsl_m)

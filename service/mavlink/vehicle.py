@@ -46,7 +46,8 @@ _COMPLAINT_S = 0.3
 _ARM_AGAIN_S = 2.0
 _LATELY_S = 10.0
 _CLIMB_START_S = 20.0
-_CLIMB_MPS = 0.7
+_CLIMB_MPS = 0.7  # at least, unless its parameters say that it climbs more slowly
+_CLIMB_SHARE = 0.7  # of what they say, on the whole way up
 _CLOCKS_APART_S = 60.0
 _SEVERITY_INFO = 6
 _SEVERITY_WARNING = 4
@@ -220,18 +221,19 @@ class Vehicle:
         system id, that one alone; `connect` waits for it. Nothing is known of it until then, and it is not ours."""
         self._shell.forget(system_id)
 
-    async def enter_guided(self, *, there: bool = False) -> None:
+    async def enter_guided(self, *, there: bool = False, out_of: str | None = None) -> None:
         """On an operator's order: enter the guided mode if need be, and take control.
 
         Args:
             there: nobody has ordered it: its pilot gives the aircraft over by having selected the mode.
+            out_of: nobody has ordered it just now: only out of this mode, which its pilot may have left since.
 
         Raises:
             NotPermitted: the vehicle is not heard, or is not in the mode where it has to be `there`.
             CommandFailed: it does not enter the mode.
         """
         self._shell.pump()
-        if not self.telemetry.guided and there:
+        if not self.telemetry.guided and (there or out_of not in (None, self.telemetry.mode)):
             raise NotPermitted(f"its pilot has selected {mode_title(self.telemetry.mode)}")
         if not self.telemetry.guided or self._core.goes_by_itself(self._clock.now()):
             autopilot = self._need_autopilot()
@@ -307,7 +309,7 @@ class Vehicle:
             up = t.landed_state == "in_air" and t.alt_home_m >= height_m - max(0.1 * height_m, 1.0)
             return "up" if up and t.guided else None
 
-        result = await self._shell.until(ended, self._shell.patience(_CLIMB_START_S + height_m / _CLIMB_MPS))
+        result = await self._shell.until(ended, self._shell.patience(climb_s(height_m, t.most_climb_mps)))
         if result != "up":
             t = self.telemetry
             why = (
@@ -443,3 +445,9 @@ class Vehicle:
         """What the vehicle has said about it, if anything."""
         texts = [t.text for t in self._core.recent_texts(since) if t.severity <= _SEVERITY_WARNING]
         return f" (it says: {texts[-1]})" if texts else ""
+
+
+def climb_s(height_m: float, most_climb_mps: float | None) -> float:
+    """How long a take-off to a height may last, of an aircraft that climbs so fast at most (None: not told)."""
+    told = math.inf if most_climb_mps is None else _CLIMB_SHARE * most_climb_mps
+    return _CLIMB_START_S + height_m / min(_CLIMB_MPS, told)

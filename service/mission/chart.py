@@ -61,11 +61,14 @@ class Chart:
         return written(point, self.grid.coordinates)
 
     def heading(self, t: Telemetry) -> str:
-        """Where it goes, in the grid's eight directions; where its nose points while it goes nowhere."""
+        """Where it goes, in the grid's eight directions; where its nose points while it goes nowhere, or that is
+        not known; north while nothing is known."""
         north, east, _ = t.velocity_ned_mps
         heading = t.heading_deg
         if math.hypot(north, east) >= GOES_MPS or not math.isfinite(heading):
             heading = math.degrees(math.atan2(east, north))
+        if not math.isfinite(heading):
+            return DIRECTIONS[0]
         return DIRECTIONS[round(((heading - self.frame.bearing_deg) % 360.0) / 45.0) % 8]
 
     def latlon(self, cell: tuple[float, float]) -> LatLon:
@@ -102,13 +105,17 @@ class Chart:
         """Over an exclusion."""
         return bool(shapely.contains_xy(self.grid.keep_out.core.prepared, *self.metres(point)))
 
-    def refuse_over_home(self, excluded: shapely.Geometry | None, t: Telemetry) -> None:
-        """Raises BadInput where ground that is to be excluded (in degrees, x = longitude) has home in it."""
-        lat, lon = home = self.home(t)
-        if excluded is not None and shapely.contains(excluded, shapely.Point(lon, lat)):
-            raise BadInput(
-                f"the exclusion: the aircraft's home, {self.written(home)}, lies in it; move one of the two"
-            )
+    def refuse_over_home(self, excluded: shapely.Geometry | None, t: Telemetry, name: str = "") -> None:
+        """Raises BadInput where ground that is to be excluded (in degrees, x = longitude) has home in it, or nearer to
+        it than legs may come: no way would lead home. `name`: the aircraft's, where there are several."""
+        home, least = self.home(t), self.grid.clearance_m
+        if excluded is None:
+            return
+        metres = shapely.distance(self.frame.flatten(excluded), shapely.Point(self.metres(home)))
+        if metres < least:
+            lies = f"lies {metres:.0f} m from it, less than {least:g} m" if metres else "lies in it"
+            whose = f"the home of aircraft {name}" if name else "the aircraft's home"
+            raise BadInput(f"the exclusion: {whose}, {self.written(home)}, {lies}; move one of the two")
 
     def route(self, start: LatLon, goal: LatLon) -> list[LatLon]:
         """The way to `goal` around the exclusions; straight there when they leave none."""

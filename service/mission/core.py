@@ -13,6 +13,7 @@ nothing.
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -44,12 +45,12 @@ from service.mission.effects import (
     row,
 )
 from service.mission.entering import entered, phase_of
-from service.mission.finding import found_after_all, over_for_all
+from service.mission.finding import found_after_all, not_enough_after_all, over_for_all
 from service.mission.flight import Flight
 from service.mission.grounded import Grounded
 from service.mission.guard import CRITICAL, guard
 from service.mission.helm import Helm
-from service.mission.limits import Objection
+from service.mission.limits import Objection, no_stop
 from service.mission.logbook import Logbook
 from service.mission.news import (
     Done,
@@ -64,9 +65,10 @@ from service.mission.news import (
     Order,
     Thought,
 )
-from service.mission.orders import judged, ordered, sensible
+from service.mission.orders import concerned, gives_back, judged, ordered, sensible
 from service.mission.phase import (
     Begin,
+    ComeUp,
     Enter,
     Find,
     GiveUp,
@@ -83,17 +85,28 @@ from service.mission.phase import (
     Settle,
     Stand,
     Stay,
+    Unsettle,
     Wish,
+    say,
     warn,
 )
 from service.mission.reserve import Reserve
 from service.mission.situation import Situation, on_ground
-from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing, Terms
+from service.mission.standing import (
+    LEAST_PATIENCE_WALL_S,
+    Look,
+    Standing,
+    Terms,
+    as_asked,
+    may_be_aloft,
+    one_more,
+)
 from service.mission.states import (
     FINAL,
     FLYING,
     MAY_MOVE,
     MOVING,
+    SEARCHED_TO,
     Event,
     State,
     next_state,
@@ -104,7 +117,6 @@ from service.mission.watch import VehicleWatch
 from service.reasons import Reason
 from service.rows import DecisionRow, ReplacedRow, TransitionRow
 
-HOW = {State.YIELDED: "; Resume gives it back"}
 _BEFORE_FLIGHT = (State.READY, State.TAKEOFF)
 _WARNING = logging.WARNING
 GIVEN_UP_AFTER = 10  # waypoints that the ground forbids
@@ -142,7 +154,9 @@ class MissionCore:
         """The action under way."""
         self.overtaken = 0
         """How often a person has stopped the aircraft, or taken it: an order of before counts no more then."""
-        self._left = self.standing
+        self._left = self._flown_as = (
+            self.standing
+        )  # as an earlier process left it; and what is asked of it since
         self._logbook = Logbook(self.flight, self._left)
         self.standing = replace(
             self.standing, state=State.WAITING, causes=frozenset(), homeward=self._left.goes_home
@@ -183,6 +197,8 @@ class MissionCore:
                 self._ended(news)
             case _:
                 self._want(self._watch.read(news, self._look()))
+        if isinstance(news, MapChanged):
+            self._want(not_enough_after_all(self._look()))
         self._want(self._watch.landed(self._look()))
         its_own = isinstance(news, (Thought, NotThought, Hit, MapChanged)) or (
             isinstance(news, (Done, Failed)) and not ordered_it
@@ -249,6 +265,9 @@ class MissionCore:
 
     def told(self, seen: Situation, now: float) -> Other:
         """This aircraft as the other aircraft of the search are to see it: in the air from when it is about to be."""
+        if not math.isfinite(seen.telemetry.heartbeat_time) and may_be_aloft(self._flown_as, self.flight):
+            climbs = self._flown_as.state == State.TAKEOFF
+            return self.helm.traffic.unheard(seen.telemetry, now, self.flight, climbs=climbs)
         standing, heard = self.standing, now - seen.telemetry.heartbeat_time < self.terms.heartbeat_fresh_s
         course = Course(
             standing.state == State.TAKEOFF,
@@ -263,9 +282,20 @@ class MissionCore:
             return []
         return [here(seen.telemetry), *self.chart.latlons([self._phase.waypoint, *self.path])]
 
+    @property
+    def between_sorties(self) -> bool:
+        """Whether it waits on the ground for the next sortie, or did so when an earlier process left it: its aircraft
+        may be switched off."""
+        waits = self.standing.state == State.WAITING and self._left.state == State.GROUNDED
+        return waits or self.standing.state == State.GROUNDED
+
     def orders(self, seen: Situation) -> list[str]:
         """The orders that would change something now."""
         return sensible(replace(self._look(), seen=seen))
+
+    def concerned(self, command: str, seen: Situation) -> bool:
+        """Whether an order means something now."""
+        return concerned(command, replace(self._look(), seen=seen))
 
     # ---- wishes
 
@@ -292,6 +322,7 @@ class MissionCore:
         self._emit(Tell(f"search {self.standing.state}: this aircraft is let go for another one", 5))
         self._emit(Note(f"waiting for {said}, in the place of system {t.system_id} ({t.autopilot})"))
         self._emit(ForgetAircraft(wish.system_id))
+        self._flown_as = Standing()
         self._begin_with_an_aircraft()
         self._phase = Grounded(None, coming=True)
 
@@ -361,19 +392,25 @@ class MissionCore:
             case GoOn():
                 self._want(self._logbook.goes_on(self._seen, now))
             case Settle(why=""):
-                self._change(settled=True)
+                self._change(settled=True, enough=False)
             case Settle(why=why):
-                self._change(settled=True, searched=True, why_stopped=why)
+                enough = why.startswith(SEARCHED_TO)
+                self._change(settled=True, searched=True, why_stopped=why, enough=enough)
                 state = self.standing.state  # which stays; that no sortie follows has to outlive the process
                 self._emit(WriteRow(TransitionRow(state, Event.FINISH, state, why)))
+            case Unsettle(why=why):
+                self._change(settled=False, enough=False, why_stopped=why)
+                state = self.standing.state
+                self._emit(WriteRow(TransitionRow(state, Event.RESUME, state, why)))
             case Lost():
                 self._phase.lost(self._look())
             case Stay(why=why):
-                if why not in self.standing.why:
-                    self._change(why=f"{self.standing.why}; {why}")
+                self._change(why=one_more(self.standing.why, why))
             case GiveUp(reason=reason):
                 self._emit(Note(reason, logging.ERROR))
                 self._give_up(reason, stop=True, then="hovering")
+            case ComeUp():
+                self._come_up(wish)
             case Overtaken():
                 self._overtake(wish)
             case Pending():
@@ -431,7 +468,7 @@ class MissionCore:
             self._emit(Note(f"waypoint not sent: {objection.reason}", _WARNING))
         self._kept_from = objection.reason if objection.cause == "apart" else ""
         if self._phase is phase:
-            phase.lost(self._look())
+            phase.refused(objection, self._look())
 
     def _change(self, **fields: object) -> None:
         self.standing = replace(self.standing, **fields)  # type: ignore[arg-type]
@@ -450,7 +487,8 @@ class MissionCore:
         self._enter(before, after, wish)
         self._emit(WriteRow(TransitionRow(before, wish.event, after, wish.reason)))
         self._emit(Note(f"{before} → {after}: {wish.reason}"))
-        self._emit(Tell(f"search {after}: {wish.told or wish.reason}{HOW.get(after, '')}"))
+        how = f"; {gives_back(self._look())}" if after == State.YIELDED else ""
+        self._emit(Tell(f"search {after}: {wish.told or wish.reason}{how}"))
         return True
 
     def _enter(self, before: State, after: State, wish: Happen) -> None:
@@ -484,7 +522,27 @@ class MissionCore:
         if wish.home:
             self._happen(Happen(Event.RETURN, wish.reason, stopped="the autopilot was silent"))
         else:
-            self._happen(Happen(Event.RETURN if self.standing.homeward else Event.RESUME, wish.reason))
+            self._happen(Happen(self.standing.goes_on_by, wish.reason))
+
+    def _come_up(self, wish: ComeUp) -> None:
+        """What a person wants of an aircraft that is not heard yet is as good as done, whatever a flag says later."""
+        if not wish.ticket and self._left.state == State.HOLDING:
+            return  # what an operator holds stays so, whatever others find
+        asked = as_asked(self._left, wish.event, wish.why)
+        if asked is not None:
+            self._left = asked
+            homeward = self.standing.homeward or asked.goes_home
+            said = f"it will be {asked.state} once it is heard: {wish.why}"
+            self._change(why=said, homeward=homeward, settled=asked.settled)
+            self._change(why_stopped=asked.why_stopped, searched=asked.searched)
+            state = self.standing.state
+            self._emit(WriteRow(TransitionRow(state, wish.event, state, wish.why)))
+            self._emit(Note(said))
+        elif wish.event == Event.FINISH:
+            self._happen(Happen(wish.event, wish.why, stopped=wish.why, searched=True))
+        in_vain = asked is None and wish.event != Event.FINISH
+        refused = f"it was left {self._left.state} and is not heard yet; order it once it is"
+        self._emit(Answer(wish.ticket, refused if in_vain else ""))
 
     def _give_up(self, reason: str, *, stop: bool, then: str) -> None:
         before = self.standing.state
@@ -502,13 +560,14 @@ class MissionCore:
     # ---- stopping
 
     def _stop(self) -> bool:
-        """Stop here. A stop is a waypoint too: while the position is not trusted, the autopilot brakes by itself."""
+        """Stop here. A stop is a waypoint too: while none can be sent, the autopilot brakes by itself."""
         self._drop_action()
         self._emit(Rest())
         if not self._seen.telemetry.in_control:
             return False
-        doubts = self.helm.doubts(self._seen.telemetry, self._now)
-        self._emit(Brake() if doubts else Stop(self.helm.heights.least_stop_amsl_m(self._seen.telemetry)))
+        t = self._seen.telemetry
+        blind = self.helm.doubts(t, self._now) or no_stop(t)
+        self._emit(Brake() if blind else Stop(self.helm.heights.least_stop_amsl_m(self._seen.telemetry)))
         return True
 
     def _drop_action(self) -> None:
@@ -550,10 +609,17 @@ class MissionCore:
 
     def _fly_around(self, grid: Grid) -> None:
         """Other ground is excluded now: a leg that would cross it is stopped here, before it is planned anew."""
-        t = self._seen.telemetry
+        t, known = self._seen.telemetry, self.chart.grid.layout_notes
         self.chart.take(grid)
+        for note in grid.layout_notes:
+            if note not in known:
+                self._want(say(note, self._look()))
         crosses = self.helm.crosses(t)
         self.helm.regrid()
+        self.reserve.forget_way()
+        hovers = self.standing.state in (State.HOLDING, State.FOUND) and not on_ground(t)
+        if hovers and self.chart.excluded(here(t)):
+            self._want(warn("it hovers over ground that is excluded now", self._look()))
         if crosses and self.standing.state in MOVING and not self.standing.goes_home_by_itself:
             self._emit(
                 Note("the leg that was flown crosses ground that is excluded now: stopping first", _WARNING)

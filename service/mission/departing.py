@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from service.mission.effects import (
     Action,
@@ -36,10 +37,12 @@ from service.mission.phase import (
     warn,
 )
 from service.mission.situation import hovering, on_ground
-from service.mission.standing import Look, Standing
+from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing
 from service.mission.states import Event, State
 from service.rows import CommandRow
 
+ALOFT_M = 5.0  # so high above home nothing that is armed is on the ground, whatever it says
+LACKS_S = 10.0  # for so long what it lacks may be told yet
 AS_LEFT = "as it was before the restart"
 
 
@@ -78,6 +81,23 @@ class Waiting(Phase):
                 return
             self._asked, self._not_before = False, look.now + RETRY_S
             yield Note(f"the next sortie's aircraft is still waited for: {news.reason}")
+
+
+class Lacks:
+    """Says what the aircraft lacks that a search needs, while somebody is to take it up by hand: it would be waited for
+    in silence, or flown up in vain."""
+
+    def __init__(self) -> None:
+        self._since, self._told = math.inf, ""
+
+    def tick(self, look: Look) -> Iterator[Wish]:
+        """Say it once it has been so for a while, and again when it is something else."""
+        lacks = "; ".join(look.seen.missing)
+        self._since = min(self._since, look.now) if lacks else math.inf
+        lasts = look.now - self._since >= max(LACKS_S, LEAST_PATIENCE_WALL_S * look.terms.speedup)
+        if lasts and lacks != self._told and look.heard():
+            self._told = lacks
+            yield from warn(f"no search with this aircraft: {lacks}", look)
 
 
 class Handover:
@@ -125,7 +145,7 @@ class Ready(Phase):
     def __init__(self, left: Standing) -> None:
         self._left = left
         self._begun = self._taking_off = False
-        self._handover = Handover()
+        self._handover, self._lacks = Handover(), Lacks()
 
     def tick(self, look: Look) -> Iterator[Wish]:
         """Get ready, or wait for whoever flies."""
@@ -134,6 +154,7 @@ class Ready(Phase):
             self._begun = True
             yield from self._begin(look)
             return
+        yield from self._lacks.tick(look)
         if on_ground(t):
             yield Stand()
             if self._left.goes_home:
@@ -177,7 +198,7 @@ class Ready(Phase):
             )
         elif why := look.helm.unfit(t, look.seen.others):
             yield GiveUp(why)
-        elif down and terms.may_take_off and not self._order_needed(look):
+        elif down and terms.may_take_off and not order_needed(look):
             self._taking_off = True
             yield WaitReady()
         else:
@@ -192,7 +213,8 @@ class Ready(Phase):
                 f"{first}select {look.seen.guided_title}: the search starts when the aircraft hovers in it"
             )
             yield Tell(f"search READY: {first}select {look.seen.guided_title}")
-        for said in [look.helm.far(t), *look.helm.of_the_ground(t)]:
+        by_hand = "" if terms.may_take_off else lands_beside(look)
+        for said in [look.helm.far(t), by_hand, *look.helm.of_the_ground(t)]:
             if said:
                 yield Note(said, 30)
                 yield Tell(f"search: {said}", 4)
@@ -202,10 +224,16 @@ class Ready(Phase):
         waits = look.settings.run.next_sortie_within_s > 0.0 and not self._left.goes_home
         return waits and look.flight.flown and not look.terms.may_take_off_again
 
-    def _order_needed(self, look: Look) -> bool:
-        """Whether only an order of now lets it take off, and no flag of an earlier hour."""
-        terms = look.terms
-        return terms.restarted or (look.flight.flown and not terms.may_take_off_again)
+
+def order_needed(look: Look) -> bool:
+    """Whether only an order of now lets it take off, and no flag of an earlier hour."""
+    terms = look.terms
+    return terms.restarted or (look.flight.flown and not terms.may_take_off_again)
+
+
+def lands_beside(look: Look) -> str:
+    """What a person must know of two that land at one place, before the flight; the built-in world has no such fear."""
+    return "" if look.settings.mock else look.helm.beside(look.seen.telemetry, look.seen.others)
 
 
 def climb(look: Look) -> Happen:
@@ -242,11 +270,14 @@ class TakingOff(Phase):
             t = look.seen.telemetry
             if why := look.helm.unfit(t, look.seen.others) or look.helm.too_empty(t, look.seen.others):
                 yield self._in_vain(why, look)
+            elif beside := lands_beside(look):
+                yield from warn(beside, look)
         if self._failed is not None:
             if look.now >= self._patient_until:
                 yield self._in_vain(self._failed.reason, look)
         elif not look.busy and self._left:
-            yield self._left[0]
+            step, mode = self._left[0], look.seen.telemetry.mode
+            yield replace(step, out_of=mode) if isinstance(step, EnterGuided) else step
 
     def _wait(self, doubts: str, look: Look) -> Iterator[Wish]:
         """What would hold it in the air keeps it on the ground, for as long as arming would be tried."""
@@ -270,8 +301,12 @@ class TakingOff(Phase):
                 yield Happen(Event.AIRBORNE, f"at {self._height_m:.0f} m")
 
     def _in_vain(self, why: str, look: Look) -> GiveUp | Happen:
-        """The aircraft does not take off. Between two sorties the search waits on for somebody to see to it."""
-        down = look.seen.telemetry.landed_state == "on_ground"
+        """The aircraft does not take off: what is in the air already flies home. Between two sorties the search waits
+        on for somebody to see to it."""
+        t = look.seen.telemetry
+        down = t.landed_state == "on_ground"
+        if t.armed and t.in_control and not (down and t.alt_home_m < ALOFT_M):
+            return Happen(Event.RETURN, why, stopped=why)
         if down and look.flight.sorties and look.settings.run.next_sortie_within_s > 0.0:
             return Happen(Event.DOWN, f"it did not take off: {why}")
         return GiveUp(why)

@@ -27,8 +27,8 @@ async def do(action: Action, vehicle: Vehicle, patience_s: float) -> Done:
             await vehicle.connect(patience_s)
         case WaitReady():
             await vehicle.wait_ready(patience_s)
-        case EnterGuided(there=there):
-            await vehicle.enter_guided(there=there)
+        case EnterGuided(there=there, out_of=mode):
+            await vehicle.enter_guided(there=there, out_of=mode)
         case Arm():
             await vehicle.arm()
         case TakeOff(height_m=height):

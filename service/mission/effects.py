@@ -161,9 +161,11 @@ class WaitReady:
 @dataclass(frozen=True, slots=True)
 class EnterGuided:
     """Enter the guided mode, if need be, and take control; `there`: of an aircraft that is in it already, not of one
-    whose pilot has just selected another mode."""
+    whose pilot has just selected another mode; `out_of`: of one that is in this mode still, not of one whose pilot has
+    just selected another. An operator's order alone goes without either."""
 
     there: bool = field(default=False, compare=False)
+    out_of: str | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -293,6 +293,16 @@ class Energy:
             return f"{battery}: {way}, cannot be flown in this wind"
         return f"{battery}: {way}, needs {needed:.0f} % and {flight.reserve_percent:g} % are kept"
 
+    def spent(self, flight: FlightSettings) -> str:
+        """Why nothing on the way home can be waited for any longer, or nothing: half of what is kept beyond the way is
+        used up, or the autopilot calls the battery worse than low."""
+        if self.state in _WORN - {"low"}:
+            return f"the autopilot calls the battery {self.state}"
+        needed = cost_per_s(self.percent_per_s, flight) * (self.home.seconds - self.home.waits_s)
+        if self.percent is None or self.percent > needed + 0.5 * flight.reserve_percent:
+            return ""
+        return f"battery {self.percent:.0f} %{self._reckoned()}: no more waiting on the way home"
+
     def warning(self) -> str:
         """What the pilot and the page must know of the level, or nothing."""
         if self.percent is None:

@@ -28,11 +28,18 @@ def entered(standing: Standing, after: State, wish: Happen, now: float) -> Stand
         why_stopped=wish.stopped if first else standing.why_stopped,
         searched=wish.searched if first else standing.searched,
         settled=(standing.settled or wish.event in SETTLED) and after not in FLYING,
+        enough=still_enough(standing, wish.event, after),
         causes=standing.causes if holds else frozenset(),
         homeward=after == State.RETURNING or (standing.homeward and (holds or after == State.READY)),
         direct=(standing.direct or wish.direct) and after not in FLYING,
         autopilot_returns=False,
     )
+
+
+def still_enough(standing: Standing, event: Event, after: State) -> bool:
+    """Whether all that settles the search once an event has led to a state is that enough was searched."""
+    others = SETTLED - {Event.SEARCHED}
+    return (event == Event.SEARCHED or (standing.enough and event not in others)) and after not in FLYING
 
 
 def phase_of(state: State, before: State, left: Standing, look: Look) -> Phase:

@@ -15,7 +15,7 @@ from service.chances import sure
 from service.evidence.found import Found
 from service.geometry import distance_m
 from service.mission.effects import Stop, WriteRow
-from service.mission.phase import Find, Happen, Phase, Settle, Wish, say
+from service.mission.phase import ComeUp, Find, Happen, Phase, Settle, Unsettle, Wish, say
 from service.mission.standing import Look
 from service.mission.states import Event, State
 from service.rows import FoundRow
@@ -78,10 +78,23 @@ def over_for_all(look: Look) -> Iterator[Wish]:
     if not why or standing.settled or standing.flying:
         return
     silent = standing.state == State.HOLDING and standing.causes <= {"detector"}
-    if standing.state in (State.WAITING, State.READY, State.TAKEOFF, State.GROUNDED) or silent:
+    if standing.state == State.WAITING:
+        yield ComeUp(Event.FINISH, why)
+    elif standing.state == State.READY and look.flight.aloft_s(look.now) > 0.0:
+        return  # an earlier process left it in the air: it comes up as that did, and is not left to hover
+    elif standing.state in (State.READY, State.TAKEOFF, State.GROUNDED) or silent:
         yield Happen(Event.FINISH, why, stopped=why, searched=True)
     else:
         yield Settle(why)
+
+
+def not_enough_after_all(look: Look) -> Iterator[Wish]:
+    """See whether news, or news taken back, leave less searched than the search ended for."""
+    seen = look.seen
+    if look.standing.enough and seen.searched < seen.enough:
+        why = f"by the news only POS {sure(seen.searched)} is searched: the search is not over"
+        yield Unsettle(why)
+        yield from say(why, look)
 
 
 class OverThePlace(Phase):

@@ -40,6 +40,8 @@ class Flight:
     left_at: float = 0.0
     told_s: float = 0.0
     told_at: float = 0.0
+    goal: LatLon | None = None
+    """Where an earlier process sent it last."""
     by: tuple[int, str] | None = None
     """Who flies: the MAVLink system id and the autopilot."""
     _written: int = 0

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from service.mission.departing import Handover, climb
+from service.chances import sure
+from service.mission.departing import Handover, Lacks, climb
 from service.mission.effects import Connect, Note, WaitReady
 from service.mission.news import Done, Failed, News
 from service.mission.phase import RETRY_S, Happen, Phase, Stand, Stay, Wish, say
@@ -27,7 +28,7 @@ class Grounded(Phase):
 
     def __init__(self, percent: float | None, *, coming: bool = False) -> None:
         self._percent, self._coming = percent, coming
-        self._handover = Handover(between=True)
+        self._handover, self._lacks = Handover(between=True), Lacks()
         self._told = self._fresh = False
         self._not_before = 0.0
 
@@ -35,6 +36,10 @@ class Grounded(Phase):
         """Wait for a battery, for whoever flies, or for too long."""
         t, standing = look.seen.telemetry, look.standing
         waits_s = look.settings.run.next_sortie_within_s
+        if look.seen.searched >= look.seen.enough:  # by others, meanwhile: nothing is left to fly for
+            why = f"searched to POS {sure(look.seen.searched)}"
+            yield Happen(Event.FINISH, why, stopped=why, searched=True)
+            return
         if not self._told:
             self._told = True
             yield from say(f"the search is not finished: {how_to_fly(look)}, or finish", look)
@@ -45,6 +50,7 @@ class Grounded(Phase):
                 yield Connect()
         elif on_ground(t):
             yield Stand()
+            yield from self._lacks.tick(look)
             yield from self._look_at_the_battery(look)
         else:
             yield from self._handover.tick(look)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from service.config import SPARE_M, Settings
 from service.evidence.mask import looks_count
-from service.geometry import LatLon, Metres, moved
+from service.geometry import LatLon, Metres, between, moved
 from service.ground.leg import GroundProfile, highest_above, least_clearance, passing, profile
 from service.mavlink.telemetry import Telemetry
 from service.mission.chart import Chart, here
@@ -232,13 +232,13 @@ class Heights:
         length = self._chart.distance(start, point)
         pieces = 1
         while length / pieces > _SHORTEST_PIECE_M:
-            end = _between(start, point, 1.0 / pieces)
+            end = between(start, point, 1.0 / pieces)
             seen = self._profile(start, end)
             above = self._height_of(seen, seen.highest_m) - float(np.nanmin(seen.ground, initial=math.inf))
             if above <= self._flight.max_height_m:
                 return end if pieces > 1 else point
             pieces *= 2
-        return point if pieces == 1 else _between(start, point, 1.0 / pieces)
+        return point if pieces == 1 else between(start, point, 1.0 / pieces)
 
     def take_off_m(self) -> float:
         """How high above home to climb from it."""
@@ -408,8 +408,3 @@ class Heights:
         assert self.relief is not None
         metres = self._chart.metres
         return profile(self.relief, metres(here(t)), metres(self.stop_place(t)))
-
-
-def _between(start: LatLon, end: LatLon, share: float) -> LatLon:
-    """A place on the way; areas that lie on both sides of the antimeridian are refused, so longitudes are plain."""
-    return start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])

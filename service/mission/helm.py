@@ -6,14 +6,15 @@ long things have been the way they are, and the height and the fence that follow
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from service.config import Settings
-from service.geometry import LatLon
+from service.geometry import LatLon, between, offset_m
 from service.mavlink.events import Target
 from service.mavlink.target import distance_m
 from service.mavlink.telemetry import Telemetry, Wind
-from service.mission.apart import Other
+from service.mission.apart import Other, called
 from service.mission.chart import Chart, here
 from service.mission.effects import SendWaypoint
 from service.mission.energy import take_off_objection
@@ -24,6 +25,7 @@ from service.mission.limits import (
     Objection,
     PositionTrust,
     Progress,
+    not_airborne,
     reference_objection,
     wind_objection,
 )
@@ -32,7 +34,10 @@ from service.mission.traffic import Traffic
 WINDY_S = 5.0
 FAR_M = 50.0
 STRAYED_S = 2.0
+BESIDE_M = 4.0
+"""Whose home is nearer to another's may land on who stands there already: GPS is not better."""
 LOW_S = 1.0
+AIRBORNE_S = 2.0  # so long it may not say that it is in the air
 
 
 class Helm:
@@ -51,7 +56,7 @@ class Helm:
         self.trust = PositionTrust(settings.flight, fresh_s)
         near_m = max(settings.flight.corner_m, 0.3 * chart.frame.cell_m)
         self._progress = Progress(patience_s, near_m)
-        self._windy = Lasting(WINDY_S)
+        self._windy, self._aground = Lasting(WINDY_S), Lasting(max(AIRBORNE_S, fresh_s))
         self._strayed, self._straying = Lasting(STRAYED_S), Straying()
         self._low, self._sinking = Lasting(LOW_S), Straying()
         self.heights = Heights(chart, settings)
@@ -82,14 +87,17 @@ class Helm:
     def unfit(self, t: Telemetry, others: Sequence[Other]) -> str:
         """Why this aircraft is not the one to begin with, or nothing: it is too far away, must not land where it would,
         or is another mission's."""
-        return self.too_far(t) or self._no_home(t) or self.traffic.twin(t, others)
+        return self.too_far(t) or self._no_home(t, others) or self.traffic.twin(t, others)
 
-    def _no_home(self, t: Telemetry) -> str:
-        """Why it must not land where its autopilot would, or nothing."""
-        home = self._chart.home(t)
-        if not self._chart.excluded(home):
-            return ""
-        return f"home, {self._chart.written(home)}, lies in an excluded area; move one of the two"
+    def _no_home(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """Why it must not land where its autopilot would, or nothing. Among others the last leg home is ours, too."""
+        home, least = self._chart.home(t), self._chart.grid.clearance_m
+        if self._chart.excluded(home):
+            return f"home, {self._chart.written(home)}, lies in an excluded area; move one of the two"
+        if others and self._chart.too_near(home):
+            said = f"lies within {least:g} m of an excluded area"
+            return f"home, {self._chart.written(home)}, {said}; move one of the two"
+        return ""
 
     def too_far(self, t: Telemetry) -> str:
         """Why the aircraft is too far from where the search is to begin, or nothing."""
@@ -110,6 +118,19 @@ class Helm:
         """That home is not at the launch point, when a person should know, or nothing."""
         away = self._from_launch_m(t)
         return f"home is {_metres(away)} from the launch point" if away > FAR_M else ""
+
+    def beside(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """That it lands where another aircraft lands, and may stand, when a person should know, or nothing."""
+        for other in others:
+            if t.home is None or other.system_id is None:  # not told yet
+                continue
+            metres = math.hypot(*offset_m(self._chart.home(t), other.home))
+            if metres < BESIDE_M:
+                return (
+                    f"home is {metres:.0f} m from that of {called(other)}: "
+                    "who lands second may come down on who stands there"
+                )
+        return ""
 
     def _from_launch_m(self, t: Telemetry) -> float:
         """Metres between home and the launch point, on the ellipsoid: the plane of the grid ends near the area."""
@@ -158,9 +179,9 @@ class Helm:
 
     def stop_place(self, t: Telemetry) -> LatLon:
         """Where the aircraft comes to a stand, or as near to that as the search may be."""
-        (lat, lon), (lat2, lon2) = here(t), self.stands(t)
+        stands = self.stands(t)
         for share in (1.0, 0.75, 0.5, 0.25):
-            point = lat + share * (lat2 - lat), lon + share * (lon2 - lon)
+            point = between(here(t), stands, share)
             if self.allows(point):
                 return point
         return here(t)
@@ -200,11 +221,13 @@ class Helm:
 
     def trouble(self, t: Telemetry, now: float, *, moving: bool) -> Objection | None:
         """What stands against flying on while the autopilot follows our waypoints, or nothing."""
-        doubts = self.doubts(t, now)
+        doubts, aground = self.doubts(t, now), self._aground.after(not_airborne(t) if moving else "", now)
         if not t.guided:
             return None
         if doubts:
             return Objection("position", "; ".join(doubts))
+        if aground:
+            return Objection("air", aground)
         if moving and self._target is not None:
             stuck = self._progress.stuck(self._chart.distance(here(t), self._target), now)
             return Objection("progress", stuck) if stuck else None

@@ -6,16 +6,18 @@ import math
 from collections.abc import Iterator
 
 from service.mission.effects import EnterGuided, Stop
-from service.mission.limits import hold_objection
+from service.mission.limits import hold_objection, not_airborne
 from service.mission.phase import RETRY_S, Happen, Phase, Release, Wish
 from service.mission.situation import hovering
 from service.mission.standing import Look
 from service.mission.states import Event
 
-BLIND = {"link", "position"}  # causes of a hold during which no waypoint of ours leads home
+BLIND = {"link", "position", "air"}  # causes of a hold during which no waypoint of ours leads home
+UNSURE = {"position", "air"}  # what the aircraft's own word ends
+_GOOD = {"position": "the position is good", "air": "the autopilot says that it is in the air"}
 CLIMB_AGAIN_S = 5.0
 PROMPT_S = 0.5  # a row that waits longer for the disk is late
-STAYS = {"operator"}  # causes that only a person ends
+STAYS = {"operator", "link", "position"}  # causes that no patience ends
 
 
 class Holding(Phase):
@@ -59,16 +61,16 @@ class Holding(Phase):
             yield Release("apart", "apart from the others again")
         elif "link" in causes and look.heard():
             yield self._heard_again(look)
-        elif "position" in causes and not look.helm.doubts(t, now):
+        elif causes & UNSURE and not look.helm.doubts(t, now) and not not_airborne(t):
             if t.guided or not t.in_control:
-                yield Release("position", "the position is good again")
+                cause = min(causes & UNSURE)
+                yield Release(cause, f"{_GOOD[cause]} again")
             elif not look.busy and now >= self._guided_at:  # it braked in a mode of its own
                 self._guided_at = now + RETRY_S
-                yield EnterGuided()
-        elif not causes & {*BLIND, *STAYS} and (
-            why := hold_objection(now - standing.since, look.settings.flight)
-        ):
-            yield Happen(Event.RETURN, why, stopped=why, direct=standing.homeward)
+                yield EnterGuided(out_of=t.mode)
+        elif not causes & STAYS and (why := hold_objection(now - standing.since, look.settings.flight)):
+            direct = standing.homeward or bool(causes & BLIND)
+            yield Happen(Event.RETURN, why, stopped=why, direct=direct)
 
     def _clear(self, look: Look) -> bool:
         """The aircraft has been clear of the ground for a while; until then it is told again and again to climb."""

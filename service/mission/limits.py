@@ -25,7 +25,7 @@ _GOOD_EPH, _GOOD_ACCURACY_M = 2.0, 5.0  # as good as enough satellites, where th
 @dataclass(frozen=True, slots=True)
 class Objection:
     """Why something must not be sent; `cause` is what must pass first: "position", "limits", "ground", "link",
-    "apart" (from the other aircraft) or "state"."""
+    "apart" (from the other aircraft), "air" (its own word that it is there) or "state"."""
 
     cause: str
     reason: str
@@ -79,6 +79,22 @@ def reference_objection(t: Telemetry, flight: FlightSettings) -> str:
     if abs(t.home.alt_amsl_m - said) <= flight.max_jump_m:
         return ""
     return f"home is {t.home.alt_amsl_m:.0f} m above the sea as told, and {said:.0f} m as the position says"
+
+
+def not_airborne(t: Telemetry) -> str:
+    """Why an armed aircraft may not be in the air by its own word, without which it is sent nowhere; or nothing."""
+    if not t.armed or t.landed_state == "in_air":
+        return ""
+    says = (
+        "does not say whether" if t.landed_state == "undefined" else f"says {t.landed_state!r}, and not that"
+    )
+    return f"the autopilot {says} the aircraft is in the air"
+
+
+def no_stop(t: Telemetry) -> bool:
+    """No waypoint can stop it: it may not be in the air by its own word, or where it is is not known."""
+    placed = t.position_known and math.isfinite(t.lat + t.lon + t.alt_amsl_m)
+    return bool(not_airborne(t)) or not placed
 
 
 def hold_objection(held_s: float, flight: FlightSettings) -> str:

@@ -70,7 +70,7 @@ from service.mission.news import (
 )
 from service.mission.orders import STOPPING
 from service.mission.outlook import Outlook, pose_at
-from service.mission.situation import Situation
+from service.mission.situation import Situation, on_ground
 from service.mission.standing import Standing
 from service.mission.states import FINAL, State
 from service.mission.tickets import Tickets
@@ -205,6 +205,10 @@ class Mission:
         """The orders that would change something now."""
         return self.core.orders(self._outlook.situation())
 
+    def concerned(self, command: str) -> bool:
+        """Whether an order means something to it as it is now, be it that it is carried out already."""
+        return self.core.concerned(command, self._outlook.situation())
+
     # ---- what happens
 
     async def run(self) -> None:
@@ -231,9 +235,8 @@ class Mission:
         was refused if it was."""
         if why := self._no_place(command, place):
             return OrderReceipt(state=self.state, refused=why)
-        row = OrderRow(command, self.state, place)
+        row, before = OrderRow(command, self.state, place), self.core.overtaken
         if command not in STOPPING:
-            before = self.core.overtaken
             await self._rows.on_disk(row)
             if command in MOVING_ORDERS and self.core.overtaken != before:  # the later word counts
                 return OrderReceipt(state=self.state, refused=_OVERTAKEN)
@@ -241,7 +244,7 @@ class Mission:
             confirmed = command == "confirm"
             present = (self.found.lat, self.found.lon) if self.found else None
             await self.intake.judge(self.search.cell_at(place or present), confirmed=confirmed)
-            return await self.judged(confirmed=confirmed)
+            return await self.judged(confirmed=confirmed, moves=self.core.overtaken == before)
         ticket, done = self._tickets.draw()
         self._feed(Order(command, ticket, system_id))
         if command in STOPPING:
@@ -256,10 +259,11 @@ class Mission:
         there = self.found is not None or self.search.was_hit(self.search.place)
         return "" if there or command not in JUDGING else f"nothing was seen yet: name the place to {command}"
 
-    async def judged(self, *, confirmed: bool) -> OrderReceipt:
-        """An operator has confirmed or rejected a place, and the belief knows it; what comes of that."""
+    async def judged(self, *, confirmed: bool, moves: bool = True) -> OrderReceipt:
+        """An operator has confirmed or rejected a place, and the belief knows it; what comes of it. `moves`: nobody has
+        stopped the aircraft or taken it since."""
         ticket, done = self._tickets.draw()
-        self._feed(Judged(confirmed, self.search.found(), ticket))
+        self._feed(Judged(confirmed, self.search.found(), ticket, moves))
         refused = await done
         return OrderReceipt(state=self.state, refused=refused or None)
 
@@ -283,7 +287,7 @@ class Mission:
         not left hovering, its autopilot brings it home."""
         seen = self._outlook.situation()
         self._carry_out(self.core.leave(reason, seen, self.clock.now(), stop=stop, home=home))
-        if home and seen.telemetry.in_control and seen.telemetry.landed_state != "on_ground":
+        if home and seen.telemetry.in_control and not on_ground(seen.telemetry):
             try:
                 await self.vehicle.return_to_launch()
                 self._stopped = False
@@ -379,8 +383,8 @@ class Mission:
 
     async def _think(self, wanted: Think) -> None:
         unseen = [cell for cell in wanted.ahead if cell not in self.intake.passes]
-        state = SearchState(wanted.cell, wanted.heading, wanted.speed_mps)
         try:
+            state = SearchState(wanted.cell, wanted.heading, wanted.speed_mps)
             decision = await self.search.decide(state, unseen, wanted.left, self.clock.now())
         except Exception as error:  # whatever a planner from outside does: the aircraft is not left alone
             log.exception("the planner has failed")

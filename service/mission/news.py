@@ -29,11 +29,13 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """An operator confirmed or rejected a place, which the belief knows by now; `found` is what counts as found now."""
+    """An operator confirmed or rejected a place, which the belief knows by now; `found` is what counts as found now.
+    `moves`: that may move the aircraft, which nobody has stopped or taken since."""
 
     confirmed: bool
     found: Found | None
     ticket: int = 0
+    moves: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from service.mission.departing import climb
 from service.mission.effects import Answer, EnterGuided, WaitReady
 from service.mission.finding import tell
 from service.mission.news import Judged, Order
-from service.mission.phase import Find, Happen, Hold, Overtaken, Pending, Replace, Settle, Wish, warn
+from service.mission.phase import ComeUp, Find, Happen, Hold, Overtaken, Pending, Replace, Settle, Wish, warn
 from service.mission.situation import on_ground
 from service.mission.standing import Look
 from service.mission.states import FLYING, TABLE, Event, State
@@ -35,6 +35,8 @@ STOPPING = ("hold", "return", "home", "finish", "abort", "leave")
 OFFERED = ("hold", "resume", "return", "launch", "replace", "finish")
 """Orders that a page has a button for."""
 _MAY_LAUNCH = (State.READY, State.GROUNDED, State.YIELDED, State.HOLDING)
+_TAKES = ("resume", "return", "launch")  # what takes a yielded aircraft; finish and abort send it nothing
+_BEFOREHAND = ("hold", "return", "finish")  # mean something to an aircraft that is not heard yet
 STICKS = 0.15  # part of their way, from which on deflected sticks are a hand on them
 
 
@@ -45,6 +47,14 @@ def ordered(order: Order, look: Look) -> Iterator[Wish]:
     wish: Happen | Hold
     if order.command in STOPPING:
         yield Overtaken(f"the operator ordered {order.command}")
+    if state == State.WAITING and order.command in _BEFOREHAND:
+        why = FINISHED if order.command == "finish" else ASKED
+        yield ComeUp(_EVENTS[order.command], why, order.ticket)
+        return
+    if order.command == "return" and state == State.READY and down and look.terms.may_take_off:
+        yield Hold("operator", ASKED)  # it is at home: a flag must not fly it after that
+        yield Answer(order.ticket)
+        return
     if why := _refusal(order.command, look):
         if order.command in STOPPING and look.ordered:  # that is what it was to stop
             yield Answer(order.ticket)
@@ -99,11 +109,20 @@ def sensible(look: Look) -> list[str]:
     """The orders that would change something now. What else may be against one is told to whoever gives it."""
     state, down = look.standing.state, on_ground(look.seen.telemetry)
     stops = ["hold"] if look.ordered else []  # a launch that gets ready
+    if state == State.WAITING:
+        stops = ["hold", "return"]
     return [
         each
         for each in OFFERED
         if each in stops or not (_senseless(each, state, down) or _is_so(each, state))
     ]
+
+
+def concerned(command: str, look: Look) -> bool:
+    """Whether an order means something now, be it that it is carried out already; whether it may be is another
+    question."""
+    stops = command in STOPPING and bool(look.ordered)
+    return stops or not _senseless(command, look.standing.state, on_ground(look.seen.telemetry))
 
 
 def _is_so(command: str, state: State) -> bool:
@@ -115,6 +134,12 @@ def judged(word: Judged, look: Look) -> Iterator[Wish]:
     """What follows from an operator's word on a place, which the belief knows by now."""
     standing = look.standing
     said = f"the operator {'confirmed' if word.confirmed else 'rejected'} the place"
+    if not word.moves:  # it counts where the search goes on, or ends
+        if not word.confirmed and word.found is None:
+            yield Find(None)
+        yield from warn(f"{said}; the aircraft stays stopped, as was said since", look)
+        yield Answer(word.ticket)
+        return
     if word.confirmed and word.found is not None:
         yield Find(word.found)
         yield from tell(word.found, look, said)
@@ -135,8 +160,9 @@ def _refusal(command: str, look: Look) -> str:
     t = look.seen.telemetry
     if why := _senseless(command, look.standing.state, on_ground(t)):
         return why
-    taken = look.standing.state in (State.YIELDED, State.HOLDING)
-    if command == "resume" and taken and (t.sticks or 0.0) > STICKS:
+    yielded = look.standing.state == State.YIELDED
+    takes = command in _TAKES if yielded else command == "resume" and look.standing.state == State.HOLDING
+    if takes and (t.sticks or 0.0) > STICKS:
         return "the pilot's sticks are not in the middle; the pilot has the aircraft"
     if command == "launch":
         if not look.terms.may_take_off:
@@ -165,3 +191,10 @@ def _ours(look: Look) -> bool:
     """The aircraft is in our hands, and follows our waypoints."""
     t = look.seen.telemetry
     return t.in_control and t.guided and not look.standing.autopilot_returns
+
+
+def gives_back(look: Look) -> str:
+    """What a person does who gives a yielded aircraft back."""
+    if not on_ground(look.seen.telemetry):
+        return "Resume gives it back"
+    return "Launch gives it back" if look.terms.may_take_off else "take off, then Resume gives it back"

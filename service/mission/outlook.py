@@ -54,11 +54,13 @@ class Outlook:
             ),
             searched=search.record.searched,
             enough=search.enough,
+            left_out=search.left_out,
             place_probability=search.place.probability if looks else 0.0,
             place_in_sight=place_in_sight(search) if looks else True,
             found=search.found() if looks else None,
             confirmed=search.confirmed is not None,
             suspect_in_view=self._suspect_in_view(),
+            missing=tuple(self.vehicle.missing()) if standing.state in (State.READY, State.GROUNDED) else (),
             others=self.formation.others(search.aircraft),
             over=search.over() if self.formation.several else "",
         )

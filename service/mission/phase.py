@@ -15,6 +15,7 @@ from service.evidence.found import Found
 from service.geometry import Cell, LatLon
 from service.mission.effects import Action, Effect, Note, SendWaypoint, Tell
 from service.mission.heights import CLIMBED_M
+from service.mission.limits import Objection
 from service.mission.news import News, NotSent
 from service.mission.standing import Look
 from service.mission.states import Event
@@ -114,10 +115,27 @@ class Settle:
 
 
 @dataclass(frozen=True, slots=True)
+class Unsettle:
+    """A sortie may follow the one under way all the same, for this reason."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class Stay:
     """The state stays, for one more reason."""
 
     why: str
+
+
+@dataclass(frozen=True, slots=True)
+class ComeUp:
+    """What is ordered (`event`) of an aircraft that is not heard yet: it comes up so once it is. Answered by `ticket`;
+    0: nobody asked."""
+
+    event: Event
+    why: str
+    ticket: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +170,9 @@ Wish = (
     | Stand
     | GoOn
     | Settle
+    | Unsettle
     | Stay
+    | ComeUp
     | Overtaken
     | Pending
 )
@@ -180,6 +200,10 @@ class Phase:
 
     def lost(self, look: Look) -> None:
         """The last waypoint or stop may not have arrived."""
+
+    def refused(self, objection: Objection, look: Look) -> None:
+        """A waypoint was not sent; the phase goes on."""
+        self.lost(look)
 
 
 def say(said: str, look: Look) -> Iterator[Wish]:

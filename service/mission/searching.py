@@ -7,6 +7,7 @@ at once; a suspect in view is hovered over where that gives another look.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -36,7 +37,7 @@ from service.mission.news import Done, Failed, Hit, MapChanged, News, NotSent, N
 from service.mission.phase import RETRY_S, Begin, Enter, Happen, Hold, Listen, Phase, Way, Wish
 from service.mission.situation import Situation
 from service.mission.standing import Look
-from service.mission.states import Event, State
+from service.mission.states import SEARCHED_TO, Event, State
 from service.motion import MotionLimits, motion_of
 
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
@@ -185,7 +186,7 @@ class Searching(Phase):
         elif seen.place_probability < CLEARED_BELOW:
             yield Happen(Event.CLEARED, f"the place is no longer likely, {share(seen.place_probability)}")
         if seen.searched >= seen.enough and look.standing.state == State.SEARCHING and not suspect:
-            yield _searched(f"searched to POS {sure(seen.searched)}")
+            yield _searched(f"{SEARCHED_TO} {sure(seen.searched)}{seen.left_out}")
         elif look.flight.steps >= settings.search.max_steps:
             yield _searched(f"{look.flight.steps} steps flown")
         elif look.detector_silent():
@@ -230,6 +231,7 @@ class Searching(Phase):
         if not self._thinking and navigator.wants_decision(remaining, thinking_s):
             self._thinking = True
             speed = t.ground_speed_mps if navigator.interrupted else navigator.speed_mps
+            speed = speed if math.isfinite(speed) else 0.0  # not told: as one that stands
             left = look.battery_left()
             left = None if left is None else left.after(remaining / look.settings.flight.speed_mps)
             yield Think(navigator.waypoint, navigator.heading, navigator.ahead, speed, left)

@@ -17,10 +17,12 @@ class Situation:
     ahead of what the core was told, so the reason of what it shows may come yet. `journal_behind_s`: for how long the
     oldest row has waited to be on disk. `reported_at`: when the last detector report was taken in; `why_no_report`: why
     none was since. `searched`: the POS so far, and `enough` that at which
-    the search is at its end; `place_probability` that of the most likely place, `found` that place if
+    the search is at its end; `left_out`: what of the ground is given up then;
+    `place_probability` that of the most likely place, `found` that place if
     it counts as found (both while searching, on the way home and between two sorties); `place_in_sight`: it can
     be looked at from the air, as far as is known; `confirmed`: an operator said that it is the target's.
-    `suspect_in_view`: a frame taken now shows it. `others`: the other aircraft of the same
+    `suspect_in_view`: a frame taken now shows it. `missing`: what the aircraft lacks that a search needs, as sentences'
+    ends. `others`: the other aircraft of the same
     search; `over`: why that is over for all of them, which is told where there are others.
     """
 
@@ -32,11 +34,13 @@ class Situation:
     why_no_report: str = "the detector is silent"
     searched: float = 0.0
     enough: float = 1.0
+    left_out: str = ""
     place_probability: float = 0.0
     place_in_sight: bool = True
     found: Found | None = None
     confirmed: bool = False
     suspect_in_view: bool = False
+    missing: tuple[str, ...] = ()
     others: tuple[Other, ...] = ()
     over: str = ""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from service.config import Settings
 from service.evidence.found import Found
@@ -11,9 +11,17 @@ from service.mission.energy import Energy, Left
 from service.mission.flight import Flight
 from service.mission.helm import Helm
 from service.mission.situation import Situation
-from service.mission.states import FLYING, State
+from service.mission.states import FLYING, Event, State
 
 LEAST_PATIENCE_WALL_S = 1.5
+
+_FIRST, _LAST = 200, 300  # characters of a reason that has become too long
+
+
+def one_more(why: str, more: str) -> str:
+    """A reason with one more, unless it has that: what came first and what came last, however many there were."""
+    said = why if more in why else f"{why}; {more}"
+    return said if len(said) <= _FIRST + _LAST else f"{said[:_FIRST]} ... {said[-_LAST:]}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +35,7 @@ class Standing:
         why_stopped: why the search ended or the run was broken off; empty while it goes on.
         searched: the search ended because there was nothing more to gain, not by an order.
         settled: nothing is left to fly for: it was searched enough, found, or an operator has finished it.
+        enough: it is settled because it was searched enough, which news may change.
         found: the place that counts as found.
         causes: what it holds for; the hold ends when none is left.
         homeward: it flies home, or holds on the way there, or waits after a restart that found it so.
@@ -41,6 +50,7 @@ class Standing:
     why_stopped: str = ""
     searched: bool = False
     settled: bool = False
+    enough: bool = False
     found: Found | None = None
     causes: frozenset[str] = frozenset()
     homeward: bool = False
@@ -59,9 +69,49 @@ class Standing:
         return self.state == State.RETURNING and (self.direct or self.autopilot_returns)
 
     @property
+    def goes_on_by(self) -> Event:
+        """What ends a hold that no person has ordered: it goes on with what it did."""
+        if self.homeward:
+            return Event.RETURN
+        found = self.settled and self.found is not None  # and not one that the search went on after
+        return Event.CONFIRMED if found else Event.RESUME
+
+    @property
     def flying(self) -> bool:
         """It searches."""
         return self.state in FLYING
+
+
+_ALOFT = (State.TAKEOFF, *FLYING, State.FOUND, State.HOLDING, State.RETURNING)
+
+
+def as_asked(left: Standing, event: Event, why: str) -> Standing | None:
+    """How a run that was left so comes up where a hold, a return or the finish is wanted before its aircraft is heard.
+
+    None where that changes nothing: what its pilot has and what waits between two sorties moves by a fresh order only,
+    and what has not flown is over when it is finished. Before the first flight a return is a hold on the ground.
+    """
+    if left.state in (State.YIELDED, State.GROUNDED):
+        return None
+    if left.state not in _ALOFT:
+        return None if event == Event.FINISH else replace(left, state=State.HOLDING, why=why)
+    if event == Event.HOLD:
+        return replace(left, state=State.HOLDING, why=why)
+    over = event == Event.FINISH
+    return replace(
+        left,
+        state=State.RETURNING,
+        why=why,
+        why_stopped=why if over else left.why_stopped or why,
+        searched=left.searched or over,
+        settled=left.settled or over,
+    )
+
+
+def may_be_aloft(left: Standing, flight: Flight) -> bool:
+    """Whether an aircraft may be in the air of which is known only how an earlier process left its run."""
+    flew = left.state in (*_ALOFT, State.YIELDED) and flight.aloft_s(flight.left_at) > 0.0
+    return flew or left.state == State.TAKEOFF
 
 
 @dataclass(frozen=True, slots=True)

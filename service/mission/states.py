@@ -57,6 +57,8 @@ FLYING = (State.SEARCHING, State.CONFIRMING)
 MOVING = (*FLYING, State.RETURNING)  # on the way to waypoints of ours
 MAY_MOVE = frozenset({State.TAKEOFF, State.SEARCHING, State.CONFIRMING, State.RETURNING})
 FINAL = frozenset({State.DONE, State.ABORTED})
+SEARCHED_TO = "searched to POS"
+"""So begins the reason of a search that is over because enough was searched."""
 SETTLED = frozenset({Event.SEARCHED, Event.CONFIRMED, Event.FINISH})  # after these no sortie follows
 
 TABLE: dict[tuple[State, Event], State] = {

@@ -39,6 +39,8 @@ class Takeovers:
             who = "the autopilot's failsafe" if event.failsafe else "the pilot or the autopilot"
             return f"{who} selected {mode_title(event.mode)}{self.said(event.time)}"
         if isinstance(event, TargetReplaced):
+            if event.found is None:
+                return f"{event.by} commands the aircraft"
             return f"{event.by} sends the aircraft to {written((event.found.lat, event.found.lon))}"
         if isinstance(event, Rebooted):
             return "the autopilot has rebooted"

@@ -28,6 +28,7 @@ from service.mission.apart import (
 )
 from service.mission.chart import Chart, here
 from service.mission.effects import SendWaypoint
+from service.mission.flight import Flight
 from service.mission.heights import Heights
 
 LOST_STOP_S = 10.0  # after which a stop or another point has arrived, or is known not to have
@@ -129,6 +130,28 @@ class Traffic:
             self._lands(own, t) if course.returns else own,
             in_air=aloft or self._rises_to_m is not None or t.heartbeat_time < self._rose_at,
             steered=t.in_control and guided and course.heard and not astray,
+        )
+
+    def unheard(self, t: Telemetry, now: float, flight: Flight, *, climbs: bool) -> Other:
+        """This aircraft as the others are to see it when an earlier process left it in the air, and it has not been
+        heard since: where its journalled track ends, and on its way to where it was sent last. `climbs`: it was taking
+        off, as long as that process lived."""
+        at, lat, lon, up = flight.track[-1] if flight.track else (flight.told_at, *self._chart.home(t), 0.0)
+        home_m, goals = self._heights.home_m, [] if flight.goal is None else [(flight.goal, up)]
+        if climbs:
+            at, goals = max(at, flight.told_at), [((lat, lon), self._heights.take_off_m())]
+        return Other(
+            self.name,
+            (lat, lon),
+            home_m + up,
+            (lat, lon),
+            self._chart.home(t),
+            home_m + self._return_m(t),
+            self._flight.speed_mps,
+            tuple(point for point, _ in goals),
+            tuple(home_m + height for _, height in goals),
+            age_s=now - at,
+            steered=False,
         )
 
     def _own(self, t: Telemetry, now: float) -> Other:

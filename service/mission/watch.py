@@ -25,7 +25,9 @@ from service.mavlink.events import (
     VehicleEvent,
 )
 from service.mavlink.telemetry import Telemetry
+from service.mission.departing import order_needed
 from service.mission.effects import Note, Tell, WriteRow
+from service.mission.orders import gives_back
 from service.mission.phase import Happen, Hold, Lost, Overtaken, Stay, Wish, touchdown
 from service.mission.situation import on_ground
 from service.mission.standing import Look, Standing
@@ -61,13 +63,14 @@ class VehicleWatch:
         yield from LISTENERS[type(event)](self, event, look)
 
     def _taken(self, why: str, look: Look) -> Iterator[Wish]:
-        """The aircraft is somebody else's now. One that is waited for, until its pilot hands it over, is so anyway."""
+        """The aircraft is somebody else's now. One that is waited for, until its pilot hands it over, is so anyway, but
+        for one that we are about to take off with."""
         state = look.standing.state
         yield Overtaken(why)
         if state in _THEIRS:
             yield Stay(why)
             yield WriteRow(YieldedRow(why))
-        elif state not in _WAITS or look.terms.may_take_off:
+        elif state not in _WAITS or (look.terms.may_take_off and (look.busy or not order_needed(look))):
             yield Happen(Event.PILOT, why)
 
     # ---- the listeners
@@ -83,14 +86,14 @@ class VehicleWatch:
     def _mode(self, event: ModeChanged, look: Look) -> Iterator[Wish]:
         """What follows when the aircraft is in the guided mode again, and nobody has said whose it is."""
         if look.standing.state == State.YIELDED and event.guided and not event.commanded:
-            yield Tell(f"search YIELDED: in {look.seen.guided_title} again; Resume gives it back", 5)
+            yield Tell(f"search YIELDED: in {look.seen.guided_title} again; {gives_back(look)}", 5)
 
     def _stalled(self, event: Stalled, look: Look) -> Iterator[Wish]:
         self._stalled_at = event.time
         yield Lost()
 
     def _link_lost(self, event: LinkLost, look: Look) -> Iterator[Wish]:
-        yield Hold("link", SILENT)
+        yield _hold("link", SILENT, look)
 
     def _taken_up(self, event: TargetTaken, look: Look) -> Iterator[Wish]:
         self._refused = 0
@@ -114,9 +117,8 @@ class VehicleWatch:
         yield Note(said, 30)
         yield Tell(f"search: {said}", 4)
         if event.position_too and look.standing.state in (*MOVING, State.HOLDING):
-            yield Hold(
-                "operator", "the position has moved with the estimator's origin: is it where the map says?"
-            )
+            moved = "the position has moved with the estimator's origin: is it where the map says?"
+            yield _hold("operator", moved, look)
 
     def _not_taken(self, event: TargetNotTaken, look: Look) -> Iterator[Wish]:
         """The autopilot does not fly to the waypoint: hold, for what that is most likely due to.
@@ -132,13 +134,13 @@ class VehicleWatch:
             if self._refused < REFUSALS:
                 yield Lost()
         elif not look.heard():
-            yield Hold("link", SILENT)
+            yield _hold("link", SILENT, look)
         elif doubts := look.helm.doubts(look.seen.telemetry, look.now):
-            yield Hold("position", "; ".join(doubts))
+            yield _hold("position", "; ".join(doubts), look)
         elif self._refused < REFUSALS:
             yield Lost()
         else:
-            yield Hold("target", f"the waypoint is not flown: {event.reason}")
+            yield _hold("target", f"the waypoint is not flown: {event.reason}", look)
 
     def tick(self, look: Look) -> Iterator[Wish]:
         """What only time shows."""
@@ -159,6 +161,15 @@ class VehicleWatch:
             why = f"landed before the search was over: {standing.why}"
             said = self._takeovers.said(standing.since)  # often told only after the mode has changed
             yield touchdown(look, "on the ground, disarmed", stopped=why + (said if said not in why else ""))
+
+
+def _hold(cause: str, why: str, look: Look) -> Hold | Note:
+    """Hover for a cause, unless the autopilot flies home by our order: nothing breaks that off."""
+    return (
+        Note(f"flying home all the same: {why}", 30)
+        if look.standing.goes_home_by_itself
+        else Hold(cause, why)
+    )
 
 
 def _lands(standing: Standing) -> bool:

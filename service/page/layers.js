@@ -30,6 +30,17 @@ const KEYS = {
       "stroke-linecap": "round",
       "stroke-dasharray": "1 8",
     }),
+  news: () => [
+    draw("circle", { cx: 8, cy: 8, r: 6, class: "told clue", "stroke-width": 2.5 }),
+    draw("rect", {
+      x: 19,
+      y: 3,
+      width: 10,
+      height: 10,
+      class: "told searched",
+      "stroke-width": 2.5,
+    }),
+  ],
   hits: () => [draw("circle", { cx: 16, cy: 8, r: 5, fill: "#d95f02" })],
   area: () => [
     draw("rect", {

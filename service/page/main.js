@@ -7,7 +7,7 @@ import { showFound, stillFound } from "./found.js";
 import { showLayers, showLegend, showScale } from "./layers.js";
 import { Events, hasToken, keepToken } from "./link.js";
 import { Chart } from "./map.js";
-import { placeByClick, showNews } from "./news.js";
+import { offerPriors, placeByClick, showNews } from "./news.js";
 import { showOrders } from "./orders.js";
 import { showCurve, showFacts, showPos } from "./panel.js";
 import { Replay } from "./replay.js";
@@ -50,6 +50,7 @@ function begin(scene) {
   shown = false;
   document.title = `${scene.area} · roisearch`;
   say($("area"), scene.area);
+  offerPriors(scene.priors);
   $("orders").hidden = !live || scene.read_only;
   $("read-only").hidden = !live || !scene.read_only;
   if (scene.replay && !replay) {

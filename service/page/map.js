@@ -26,6 +26,7 @@ export const LAYERS = [
   ["ahead", "way ahead", true],
   ["hits", "detector hits", true],
   ["area", "area, exclusions, launch", true],
+  ["news", "news from the field", true],
   ["tiles", "ground map", true],
 ];
 
@@ -33,6 +34,8 @@ export class Chart {
   /** The label of each region, by its number. @type {Map<number, any>} */
   labels = new Map();
 
+  /** Which news `drawNews` has drawn, as text. @type {string | undefined} */
+  shownNews;
   /** What `drawPlaces` has drawn, as text. @type {string | undefined} */
   shownPlaces;
   /** Several aircraft; see `make`. @type {Flock} */
@@ -176,6 +179,7 @@ export class Chart {
     });
     this.seen = L.layerGroup();
     this.hitMarks = L.layerGroup();
+    this.newsOf = L.layerGroup();
     this.craft = L.marker([0, 0], {
       icon: icon(CRAFT, 36, "craft"),
       interactive: false,
@@ -197,6 +201,7 @@ export class Chart {
       ahead: this.wayOf,
       hits: this.hitMarks,
       area: this.makeArea(scene),
+      news: this.newsOf,
       tiles: tiles && this.makeTiles(tiles),
     };
   }
@@ -306,6 +311,7 @@ export class Chart {
       const span = mark.getElement()?.firstChild;
       if (span && span.textContent !== said) span.textContent = said;
     }
+    this.drawNews(state.news);
     this.drawFlight(state, changed.has("track"));
     this.drawPlaces(state);
   }
@@ -343,7 +349,7 @@ export class Chart {
     this.craft
       .getElement()
       .querySelector("g")
-      .setAttribute("transform", `rotate(${pose.heading_deg})`);
+      .setAttribute("transform", `rotate(${pose.heading_deg ?? 0})`);
   }
 
   /** @param {FootprintState} footprint */
@@ -357,6 +363,32 @@ export class Chart {
           weight: 2,
           fillOpacity: footprint.counts ? 0.25 : 0.05,
           dashArray: footprint.counts ? null : "3 4",
+        }),
+      );
+    }
+  }
+
+  /** Where the news are that stand: what is not flown over as the exclusions of the area.
+   * @param {NewsState[]} news */
+  drawNews(news) {
+    const wanted = JSON.stringify(news.map(({ id }) => id));
+    if (wanted === this.shownNews) return;
+    this.shownNews = wanted;
+    this.newsOf.clearLayers();
+    for (const { role, geometry } of news) {
+      if (!geometry) continue;
+      const style = {
+        className: role === "exclude" ? "never searchable" : `told ${role}`,
+        weight: 2.5,
+        dashArray: role === "exclude" ? "6 4" : null,
+      };
+      this.newsOf.addLayer(
+        L.geoJSON(geometry, {
+          style,
+          pane: "ground",
+          interactive: false,
+          pointToLayer: (/** @type {Feature} */ _, /** @type {unknown} */ place) =>
+            L.circleMarker(place, { ...style, pane: "ground", interactive: false, radius: 8 }),
         }),
       );
     }

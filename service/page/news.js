@@ -7,11 +7,17 @@ import { tell } from "./orders.js";
 
 const CORNERS = 32;
 const METRES_PER_DEGREE = 111195;
-const ROLES = { clue: "clue", searched: "searched by others", exclude: "not flown over" };
+const ROLES = {
+  clue: "clue",
+  searched: "searched by others",
+  exclude: "not flown over",
+  refute: "not assumed any more",
+};
 const METRES = {
   clue: "Still counts at, metres",
   searched: "Searched around it, metres",
   exclude: "Not within, metres",
+  refute: "",
 };
 
 /** @typedef {keyof typeof ROLES} Role */
@@ -36,6 +42,10 @@ function feature() {
   );
   const words = $("news-words").value.trim();
   const role = $("news-role").value;
+  if (role === "refute") {
+    const properties = { role, prior: $("news-prior").value, words };
+    return { type: "Feature", geometry: null, properties };
+  }
   if (role !== "clue") {
     const geometry = { type: "Polygon", coordinates: [ring(lat, lon, metres)] };
     const pod = role === "searched" ? { pod: Number($("news-pod").value) } : {};
@@ -63,14 +73,21 @@ async function post(path, body) {
   return (await ask(path, options)).json();
 }
 
-/** @param {() => Promise<{ id: string, status: string }>} doing */
+/** @param {() => Promise<{ id: string, status: string, notes: string[] }>} doing */
 async function say_of(doing) {
   try {
-    const { id, status } = await doing();
-    tell(`${id}: ${status}`);
+    const { id, status, notes } = await doing();
+    tell([`${id}: ${status}`, ...notes].join("; "));
   } catch (error) {
     tell(/** @type {Error} */ (error).message);
   }
+}
+
+/** What may be refuted: the parts of the area file's prior.
+ * @param {string[]} priors */
+export function offerPriors(priors) {
+  $("news-prior").replaceChildren(...priors.map((name) => make("option", { textContent: name })));
+  $("news-role").querySelector("[value=refute]").hidden = !priors.length;
 }
 
 /** The list, rebuilt only when it is another one: nothing moves under a finger.
@@ -130,15 +147,22 @@ export function placeByClick(map) {
 function showFields() {
   /** @type {Role} */
   const role = $("news-role").value;
-  /** @type {[string, string][]} */
+  const placed = ["clue", "searched", "exclude"];
+  /** @type {[string, string[]][]} */
   const fields = [
-    ["news-factor", "clue"],
-    ["news-pod", "searched"],
+    ["news-prior", ["refute"]],
+    ["news-lat", placed],
+    ["news-lon", placed],
+    ["news-metres", placed],
+    ["news-factor", ["clue"]],
+    ["news-pod", ["searched"]],
   ];
   for (const [id, of] of fields) {
-    $(id).closest("label").hidden = role !== of;
-    $(id).disabled = role !== of;
+    $(id).closest("label").hidden = !of.includes(role);
+    $(id).disabled = !of.includes(role);
   }
+  $("news-place").hidden = !placed.includes(role);
+  $("news-by-click").hidden = !placed.includes(role);
   say($("news-metres-name"), METRES[role]);
 }
 

@@ -27,6 +27,13 @@ def facts(seen: Preview) -> list[tuple[str, str]]:
         *(("prior", sentence) for sentence, _ in added_up(seen.area, grid)),
         *(("note", note) for note in (*seen.area.notes, *grid.notes)),
     ]
+    if (number := len(settings.aircraft)) > 1:
+        said.append(
+            (
+                "aircraft",
+                f"what one of {number} aircraft does, by the settings of all, as if it searched alone",
+            )
+        )
     said += [*height_facts(seen), *cover_facts(seen)]
     for region in sorted(seen.regions, key=lambda each: -each.mass)[:_MOST_REGIONS]:
         place = written(region.peak, settings.run.coordinates)

@@ -86,7 +86,8 @@ class Events:
         _point(event, pose["lat"], pose["lon"])
         detail = ET.SubElement(event, "detail")
         ET.SubElement(detail, "contact", callsign=one.callsign)
-        ET.SubElement(detail, "track", course=f"{pose['heading_deg'] % 360.0:.1f}")
+        if pose["heading_deg"] is not None:
+            ET.SubElement(detail, "track", course=f"{pose['heading_deg'] % 360.0:.1f}")
         if battery is not None:
             ET.SubElement(detail, "status", battery=f"{battery:.0f}")
         _remarks(detail, f"{one.state}, {pose['height_m']:.0f} m above launch, POS {pos:.0%}{told}")

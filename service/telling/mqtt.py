@@ -155,7 +155,7 @@ def _pose(pose: PoseState | None) -> dict[str, Any] | None:
         "lon": round(pose["lon"], 7),
         "written": pose["written"],
         "height_m": round(pose["height_m"], 1),
-        "heading_deg": round(pose["heading_deg"], 1),
+        "heading_deg": None if pose["heading_deg"] is None else round(pose["heading_deg"], 1),
     }
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from service.area import SearchArea
 from service.chances import share
 from service.config import Settings, each_aircraft
 from service.evidence.found import Found
-from service.evidence.observe import FramePose
+from service.evidence.observe import FramePose, finite_or_level
 from service.evidence.sensors import Profile
 from service.geometry import LatLon
 from service.mission.states import State
@@ -31,6 +33,7 @@ from service.view.state import (
     FootprintCell,
     FootprintState,
     FoundState,
+    GeometryState,
     NewsState,
     PlaceState,
     RunState,
@@ -144,6 +147,7 @@ class BaseView:
         }  # fmt: skip
         if pose is None:
             return shown
+        pose = replace(pose, heading_deg=finite_or_level(pose.heading_deg))  # drawn all the same
         footprint, frame = self.sensors[whose].footprint(pose), self.search.grid.frame
         corners = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [0.5, -0.5]])
         worth = (footprint.counts, footprint.covered, footprint.p_tp, footprint.p_tn)
@@ -209,11 +213,12 @@ class BaseView:
         return partial(draw_map, self.ground_now(), self.seen().copied())
 
 
-def sortie_states(sorties: Sequence[SortieRow]) -> list[SortieState]:
-    """The flights that are over, as they are told."""
+def sortie_states(sorties: Sequence[SortieRow], aircraft: str) -> list[SortieState]:
+    """The flights of an aircraft that are over, as they are told."""
     return [
         {
             "number": each.number,
+            "aircraft": aircraft,
             "landed": each.landed,
             "flight_time_s": each.seconds,
             "steps": each.steps,
@@ -236,6 +241,7 @@ def news_states(news: Sequence[FieldNews]) -> list[NewsState]:
             "lat": each.place[0],
             "lon": each.place[1],
             "cells": len(each.cells),
+            "geometry": cast(GeometryState | None, each.drawn),
         }
         for each in news
     ]

@@ -14,7 +14,7 @@ from prometheus_client import CollectorRegistry, Gauge, Histogram
 
 from service.area import SearchArea
 from service.clock import Clock
-from service.config import Settings
+from service.config import ONLY, Settings
 from service.errors import BadInput, shown
 from service.evidence.counts import Counts
 from service.evidence.observe import FramePose, finite_or_level
@@ -26,6 +26,7 @@ from service.mavlink.modes import mode_title
 from service.mission.mission import Mission
 from service.mission.situation import on_ground
 from service.mission.states import State
+from service.news.bearing import FieldNews
 from service.news.request import NewsRequest, refuse_other
 from service.search import Search
 from service.squad import Squad
@@ -43,6 +44,7 @@ from service.view.state import (
     ReportsState,
     RunState,
     WindState,
+    known_deg,
     option_states,
     pose_state,
     reports_state,
@@ -169,9 +171,9 @@ class RunView(BaseView):
             news = await asyncio.to_thread(request.news, self.search.grid, name)
             if (before := known.heard_as(name)) is not None:
                 refuse_other(news, before, stands=before in known.news)
-                return {"id": name, "status": "duplicate", "cells": 0}
-            await self._begun().hear(news)
-            return {"id": name, "status": "accepted", "cells": len(news.cells)}
+                return {"id": name, "status": "duplicate", "cells": 0, "notes": []}
+            notes = await self._heard(news)
+            return {"id": name, "status": "accepted", "cells": len(news.cells), "notes": notes}
 
     async def withdraw(self, name: str) -> HeardState:
         """News are taken back. Raises BadInput, JournalLost."""
@@ -181,8 +183,14 @@ class RunView(BaseView):
                 raise BadInput(
                     f"there is no news {shown(name)} that could be taken back; /api/state tells which stand"
                 )
-            await self._begun().hear(Withdrawn(name))
-            return {"id": name, "status": "withdrawn", "cells": standing[name]}
+            notes = await self._heard(Withdrawn(name))
+            return {"id": name, "status": "withdrawn", "cells": standing[name], "notes": notes}
+
+    async def _heard(self, said: FieldNews | Withdrawn) -> list[str]:
+        """Let all of them hear news; what there is to note of the ground that was not so before."""
+        known = self.search.grid.layout_notes
+        await self._begun().hear(said)
+        return [note for note in self.search.grid.layout_notes if note not in known]
 
     def _begun(self) -> Squad:
         if self.squad is None:
@@ -226,9 +234,9 @@ class RunView(BaseView):
             "outside": self.search.belief.outside,
             "steps": mission.flight.steps if mission else 0,
             "flight_time_s": flown,
-            "sorties": sortie_states(mission.flight.sorties) if mission else [],
+            "sorties": sortie_states(mission.flight.sorties, mission.name or ONLY) if mission else [],
             "news": news_states(self.search.known.news),
-            "flight_left_s": self._flight_left(flown),
+            "flight_left_s": self._flight_left(),
             "battery_percent": telemetry.battery_percent if telemetry else None,
             "battery_doubt": (mission.core.battery_doubt if mission else "") or None,
             "mode": mode_title(telemetry.mode) if telemetry else None,
@@ -271,7 +279,7 @@ class RunView(BaseView):
             "lat": pose.lat if pose else None,
             "lon": pose.lon if pose else None,
             "height": pose.height_m if pose else None,
-            "heading_deg": pose.heading_deg if pose else None,
+            "heading_deg": known_deg(pose.heading_deg) if pose else None,
             "battery": t.battery_percent,
             "link": link_state(mission),
             "mode": mode_title(t.mode) if t.mode else None,
@@ -279,6 +287,7 @@ class RunView(BaseView):
             "ahead": mission.ahead(),
             "steps": mission.flight.steps,
             "flight_time_s": mission.flight_time(),
+            "sorties": sortie_states(mission.flight.sorties, name),
             "pose": pose_state(pose, self.settings.run.coordinates),
             "footprint": self.footprint(pose, mission.name),
         }
@@ -329,10 +338,9 @@ class RunView(BaseView):
         age = max(0.0, self.clock.now() - intake.last_at)
         return {"silent_s": age, "silent": age > mission.core.settings.sensor.silent_after_s}
 
-    def _flight_left(self, flown: float) -> float | None:
+    def _flight_left(self) -> float | None:
         """Seconds until the way home must begin, for the battery or the time; None while unknown."""
-        left = self.mission.energy.seconds_left(self.settings.flight) if self.mission else None
-        return None if left is None else min(left, max(0.0, self.settings.flight.max_flight_s - flown))
+        return flight_left_s(self.mission, self.clock.now()) if self.mission else None
 
     def moment(self) -> Moment:
         """What there is to see now, for the page."""
@@ -360,6 +368,14 @@ def known_or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
+def flight_left_s(mission: Mission, now: float) -> float | None:
+    """Seconds until an aircraft must begin its way home, for its battery or the time of this sortie; None while
+    unknown."""
+    flight = mission.core.settings.flight
+    left = mission.energy.seconds_left(flight)
+    return None if left is None else min(left, max(0.0, flight.max_flight_s - mission.flight.aloft_s(now)))
+
+
 def pose_of(mission: Mission | None) -> FramePose | None:
     """Where an aircraft is, metres above its launch; None while that is not known."""
     if mission is None or not mission.vehicle.telemetry.position_known:
@@ -369,7 +385,7 @@ def pose_of(mission: Mission | None) -> FramePose | None:
         telemetry.lat,
         telemetry.lon,
         telemetry.alt_home_m,
-        telemetry.heading_deg if math.isfinite(telemetry.heading_deg) else 0.0,
+        telemetry.heading_deg,
         telemetry.position_time,
         finite_or_level(telemetry.pitch_deg),
         finite_or_level(telemetry.roll_deg),

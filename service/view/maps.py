@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
+from service.area import SearchArea
+from service.area.model import Exclusion
 from service.chances import share, sure
 from service.view.feed import Moment
 from service.view.scene import SearchGround
@@ -52,6 +56,9 @@ def geojson_text(ground: SearchGround, moment: Moment) -> bytes:
 def _features(ground: SearchGround, moment: Moment) -> Iterator[dict[str, Any]]:
     state, grid = moment.state, ground.grid
     yield from area_features(ground.area, grid)
+    for told in state["news"]:
+        if told["geometry"] is not None:
+            yield feature({**told["geometry"]}, told["role"], id=told["id"], words=told["words"])
     for outline in ground.outlines:
         number = outline["properties"]["number"]
         mass = state["regions"][number - 1]
@@ -90,9 +97,23 @@ def draw_map(ground: SearchGround, moment: Moment) -> bytes:
             found=(found["lat"], found["lon"]) if found else None,
             title=f"{ground.area.name}: {state['words'].lower()}",
             subtitle=said,
-            area=ground.area,
+            area=_area_now(ground, moment),
             names=ground.names,
         )
+    )
+
+
+def _area_now(ground: SearchGround, moment: Moment) -> SearchArea:
+    """The area with what is excluded by then."""
+    told = [
+        each for each in moment.state["news"] if each["role"] == "exclude" and each["geometry"] is not None
+    ]
+    return replace(
+        ground.area,
+        exclusions=(
+            *ground.area.exclusions,
+            *(Exclusion(shapely.geometry.shape(each["geometry"]), True, "news") for each in told),
+        ),
     )
 
 

@@ -6,7 +6,6 @@ spreads over most of the area names nothing; a region without a name is called a
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any, TypedDict
@@ -15,15 +14,15 @@ import numpy as np
 import shapely
 
 from service.area import SearchArea
+from service.area.document import name_in
 from service.area.frame import GridFrame
-from service.area.model import LinePrior, PointPrior, PolygonPrior, Prior
+from service.area.model import LinePrior, PointPrior, PolygonPrior, Prior, prior_shape
 
 SIDES = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 _WIDE = 0.5  # of the area: a prior that covers more says nothing about where
 _SIGMAS = 2.0  # a point's place, for its name
 _LEAST = 0.02  # of a prior's ground: less of it in a region does not name that
 _MIDDLE = 0.15  # of the area's size: nearer to its middle is no side
-_NAMED = re.compile(r'\("(.*)"\)$', re.DOTALL)
 
 
 class PlaceName(TypedDict):
@@ -35,16 +34,10 @@ class PlaceName(TypedDict):
     lon: float
 
 
-def name_in(label: str) -> str:
-    """What a person called a part of a file, from what messages call it (`document.label`); empty: nothing."""
-    found = _NAMED.search(label)
-    return found.group(1) if found else ""
-
-
 def place_names(area: SearchArea) -> list[PlaceName]:
     """The names of an area file and where they belong on a map."""
     parts: list[tuple[str, str, shapely.Geometry]] = [
-        (each.label, "prior", _geometry(each)) for each in area.priors
+        (each.label, "prior", prior_shape(each)) for each in area.priors
     ]
     parts += [(each.label, "exclude", each.polygon) for each in area.exclusions]
     parts += [(each.label, "cover", each.polygon) for each in area.covers]
@@ -126,18 +119,9 @@ def _apart(plain: dict[int, str], flat: dict[int, shapely.Geometry], frame: Grid
     return [name if often[name] == 1 else f"{name} ({number})" for number, name in named.items()]
 
 
-def _geometry(prior: Prior) -> shapely.Geometry:
-    """Where a prior is, in degrees."""
-    if isinstance(prior, PolygonPrior):
-        return prior.polygon
-    if isinstance(prior, LinePrior):
-        return prior.line
-    return shapely.Point(prior.position[1], prior.position[0])
-
-
 def _extent(prior: Prior, frame: GridFrame) -> shapely.Geometry:
     """The ground that a prior's name stands for, in the grid's metres."""
-    flat = frame.flatten(_geometry(prior))
+    flat = frame.flatten(prior_shape(prior))
     if isinstance(prior, PolygonPrior):
         return flat
     if isinstance(prior, LinePrior):

@@ -40,6 +40,7 @@ _NEXT = {
 }
 
 _PASSES = {
+    "air": "the autopilot says that it is in the air",
     "apart": "the aircraft are apart",
     "detector": "the detector reports",
     "ground": "it is clear of the ground",

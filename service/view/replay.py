@@ -17,7 +17,6 @@ from service.evidence.counts import Counts
 from service.evidence.cover import sensors_over
 from service.evidence.found import Found
 from service.evidence.images import Images
-from service.evidence.observe import finite_or_level
 from service.geometry import LatLon
 from service.known import Known
 from service.mavlink.modes import mode_title
@@ -31,7 +30,7 @@ from service.view.base import BaseView, news_states, sortie_states
 from service.view.curve import PosCurve
 from service.view.feed import Moment
 from service.view.next import STATE_WORDS
-from service.view.state import AircraftState, RunState, option_states, pose_state, reports_state
+from service.view.state import AircraftState, RunState, known_deg, option_states, pose_state, reports_state
 
 KEPT = 32  # copies of the belief along the run, to go back to
 AFTER_RESTART_S = 0.1
@@ -125,6 +124,7 @@ class ReplayView(BaseView):
         """Where the search stood; what a journal does not hold is None."""
         told, now = self._told[self._at - 1], self.times[self._at - 1]
         flight = told.leading
+        flying = next(name for name, each in told.flights.items() if each is flight)
         decision, pose = flight.decision, flight.pose
         return {
             "state": flight.state,
@@ -144,7 +144,7 @@ class ReplayView(BaseView):
             "outside": self.search.belief.outside,
             "steps": flight.steps,
             "flight_time_s": flight.flown_s,
-            "sorties": sortie_states(flight.sorties),
+            "sorties": sortie_states(flight.sorties, flying or ONLY),
             "news": news_states(self.search.known.news),
             "flight_left_s": None,
             "battery_percent": None,
@@ -155,9 +155,7 @@ class ReplayView(BaseView):
             "pose": pose_state(pose, self.settings.run.coordinates),
             "height_above_ground_m": self.above_ground(pose),
             "wind": None,
-            "footprint": self.footprint(
-                pose, next(name for name, each in told.flights.items() if each is flight)
-            ),
+            "footprint": self.footprint(pose, flying),
             "reports": reports_state(Counts(accepted=sum(each.reports for each in told.flights.values()))),
             "link": None,
             "detector": None,
@@ -192,7 +190,7 @@ class ReplayView(BaseView):
             "lat": pose.lat if pose else None,
             "lon": pose.lon if pose else None,
             "height": pose.height_m if pose else None,
-            "heading_deg": finite_or_level(pose.heading_deg) if pose else None,
+            "heading_deg": known_deg(pose.heading_deg) if pose else None,
             "battery": None,
             "link": None,
             "mode": flight.mode and mode_title(flight.mode),
@@ -200,6 +198,7 @@ class ReplayView(BaseView):
             "ahead": self._ahead(flight),
             "steps": flight.steps,
             "flight_time_s": flight.flown_s,
+            "sorties": sortie_states(flight.sorties, name or ONLY),
             "pose": pose_state(pose, self.settings.run.coordinates),
             "footprint": self.footprint(pose, name),
         }

@@ -101,6 +101,7 @@ class SearchGround:
             **self.described_regions(),
             "coordinates": self.coordinates,
             "places": place_names(self.area),
+            "priors": list(self.grid.prior_places),
             "outside": self.grid.outside,
             "notes": list(self.grid.notes),
         }

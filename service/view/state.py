@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NotRequired
+from typing import Any, NotRequired
 
 from typing_extensions import TypedDict  # what pydantic can read on Python 3.11
 
 from service.evidence.counts import Counts
 from service.evidence.found import Found, Suspect
-from service.evidence.observe import FramePose, finite_or_level
+from service.evidence.observe import FramePose
 from service.geometry import LatLon
 from service.mission.states import State
 from service.places import Coordinates, written
@@ -55,13 +55,14 @@ class SuspectState(Suspect):
 
 
 class PoseState(TypedDict):
-    """Where the aircraft is: degrees, metres above launch, seconds; its nose from true north, up, right wing down."""
+    """Where the aircraft is: degrees, metres above launch, seconds; its nose from true north (null: not known), up,
+    right wing down."""
 
     lat: float
     lon: float
     written: str
     height_m: float
-    heading_deg: float
+    heading_deg: float | None
     time: float
     pitch_deg: float
     roll_deg: float
@@ -158,10 +159,11 @@ class EstimateState(TypedDict):
 
 class SortieState(TypedDict):
     """A flight that is over: its number from 1, when it landed (seconds since the epoch), its seconds in the air and
-    cells of the search, POS after it, why it ended, and the MAVLink system id and the autopilot of the aircraft that
-    flew it, which null does not know."""
+    cells of the search, POS after it, why it ended, the name of the aircraft that flew it (each counts its own), and
+    its MAVLink system id and autopilot, which null does not know."""
 
     number: int
+    aircraft: str
     landed: float
     flight_time_s: float
     steps: int
@@ -171,9 +173,17 @@ class SortieState(TypedDict):
     autopilot: str | None
 
 
+class GeometryState(TypedDict):
+    """A GeoJSON geometry (RFC 7946), longitude first."""
+
+    type: str
+    coordinates: list[Any]
+
+
 class NewsState(TypedDict):
-    """A piece of news that stands: its id, role ("clue" or "searched"), words, the middle of its place, and how many
-    cells it is about."""
+    """A piece of news that stands: its id, role ("clue", "searched", "exclude" or "refute"), words, the middle of its
+    place, how many cells it is about (an exclusion says nothing of any), and its shape for maps, of fewer corners where
+    it has many; null where there is none, and in a run of an early version."""
 
     id: str
     role: str
@@ -181,15 +191,17 @@ class NewsState(TypedDict):
     lat: float
     lon: float
     cells: int
+    geometry: GeometryState | None
 
 
 class HeardState(TypedDict):
-    """What became of a piece of news: "accepted", "duplicate" of an id that was known, or "withdrawn"; and about how
-    many cells it is."""
+    """What became of a piece of news: "accepted", "duplicate" of an id that was known, or "withdrawn"; about how
+    many cells it is; and what a person has to know of what follows."""
 
     id: str
     status: str
     cells: int
+    notes: list[str]
 
 
 class DrawnState(TypedDict):
@@ -221,6 +233,7 @@ class AircraftState(TypedDict):
     ahead: list[LatLon]
     steps: int
     flight_time_s: float
+    sorties: list[SortieState]
     pose: PoseState | None
     footprint: FootprintState
 
@@ -285,6 +298,11 @@ def suspect_states(suspects: Sequence[Suspect], how: Coordinates) -> list[Suspec
     return [{**each, "written": written((each["lat"], each["lon"]), how)} for each in suspects]
 
 
+def known_deg(angle: float) -> float | None:
+    """An angle as it is told; None while it is not known."""
+    return angle if math.isfinite(angle) else None
+
+
 def pose_state(pose: FramePose | None, how: Coordinates) -> PoseState | None:
     """A pose as it is told."""
     if pose is None:
@@ -294,7 +312,7 @@ def pose_state(pose: FramePose | None, how: Coordinates) -> PoseState | None:
         "lon": pose.lon,
         "written": written((pose.lat, pose.lon), how),
         "height_m": pose.height_m,
-        "heading_deg": finite_or_level(pose.heading_deg),
+        "heading_deg": known_deg(pose.heading_deg),
         "time": pose.time,
         "pitch_deg": pose.pitch_deg,
         "roll_deg": pose.roll_deg,

@@ -58,7 +58,12 @@ class Target:
 
 
 def audit(
-    folder: Path, acknowledged: set[str], told: Iterable[Told], target: Target | None = None
+    folder: Path,
+    acknowledged: set[str],
+    told: Iterable[Told],
+    target: Target | None = None,
+    *,
+    refuses: bool = False,
 ) -> list[str]:
     """What is wrong with the journal of a run's folder, as sentences.
 
@@ -66,13 +71,18 @@ def audit(
         acknowledged: the ids of reports that the door has accepted.
         told: what the door has told of its belief.
         target: of the flight, if it had one.
+        refuses: whether the autopilot refused orders: then it is told to stop as often as it takes.
     """
     rows = rows_of(folder / "journal.sqlite")
     return [
         *_readable(folder / "journal.sqlite"),
         *_numbered(rows),
         *_complete(rows, acknowledged),
-        *(wrong for name in _aircraft(rows) for wrong in _moves([row for row in rows if _of(row) == name])),
+        *(
+            wrong
+            for name in _aircraft(rows)
+            for wrong in _moves([row for row in rows if _of(row) == name], refuses)
+        ),
         *_adds_up(folder, rows, told),
         *_believes_the_true(folder, rows, target),
     ]
@@ -115,7 +125,7 @@ def _aircraft(rows: list[Row]) -> list[str]:
     return sorted({_of(row) for row in rows})
 
 
-def _moves(rows: list[Row]) -> list[str]:
+def _moves(rows: list[Row], refuses: bool) -> list[str]:
     """Of one aircraft's rows: waypoints only in states that may move, few stops in a hold, no gap in the states."""
     found = []
     state, stops = "WAITING", 0
@@ -133,9 +143,8 @@ def _moves(rows: list[Row]) -> list[str]:
         elif row.kind == "command":
             command = row.body["command"]
             stops = 0 if command == "reposition" else stops + (command == "hold")
-            if command == "hold" and (
-                state not in _MAY_STOP or (stops > _MOST_STOPS and state != "CONFIRMING")
-            ):
+            many = stops > _MOST_STOPS and state != "CONFIRMING" and not refuses
+            if command == "hold" and (state not in _MAY_STOP or many):
                 found.append(f"row {row.seq}: stop {stops} in {state}")
             elif command == "reposition" and state not in _MAY_MOVE:
                 found.append(f"row {row.seq}: a waypoint in {state}")
@@ -173,6 +182,9 @@ def _observe(belief: Belief, seen: dict[str, Any]) -> None:
 
 
 def _adds_up(folder: Path, rows: list[Row], told: Iterable[Told]) -> list[str]:
+    """Reports alone make the belief, in flights without a clue: what is believed anew for one is not judged here."""
+    if any(row.kind == "news" and row.body["role"] == "clue" for row in rows):
+        return []
     grid = build_grid(read_area(folder / "area.geojson"), ground.CELL_M)
     belief = Belief(grid.prior, searchable=grid.searchable, outside=grid.outside)
     digests = [belief.digest()]

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import signal
+import sqlite3
 import subprocess
 import time
 from collections import Counter
@@ -28,7 +30,7 @@ from sim.soak.clocked import SteppedClock
 from sim.soak.eyes import Eyes, grown
 from sim.soak.judge import AFTER, OPERATOR, Judge
 from sim.soak.kinds import AT_BOOT, GROUNDS, KINDS
-from sim.soak.plan import Fault, Plan
+from sim.soak.plan import HOLD, HOME, Fault, Plan
 from sim.soak.process import Process
 from sim.soak.tap import Tap
 from sim.soak.wing import Wing
@@ -184,11 +186,24 @@ class SoakFlight:
             self._pass(fault.wait_s)
             if self._state() in _FINAL:
                 break
+            self._come_to(fault.moment)
             self.outcome.faults[fault.kind] += 1
             self.judge.steady, self.judge.during = KINDS[fault.kind].steady, fault.kind
             self._let(fault)
-            self._recover()
+            if fault.moment != HOME:
+                self._recover()
         self._go_home()
+
+    def _come_to(self, moment: str) -> None:
+        """Let the operator bring about the moment of a fault; what cannot be ordered now is left as it is."""
+        self.judge.during = ""
+        if moment == HOLD:
+            self._order("hold")
+            self.judge.stopped(time.monotonic(), OPERATOR)
+            self._pass(3.0)
+        elif moment == HOME:
+            self._order("return")
+            self._pass(2.0)
 
     def _take_off(self) -> None:
         """The search begins; an operator helps where a person or the autopilot stands in the way."""
@@ -243,12 +258,36 @@ class SoakFlight:
             setattr(eyes, switch, True)
             self._pass(fault.seconds)
             setattr(eyes, switch, False)
+        elif kind in ("clue", "exclude"):
+            self._tell_news(kind, fault)
+        elif kind == "journal_locked":
+            self._lock_the_journal(fault.seconds)
         elif kind == "operator_holds":
             self._order("hold")
             self.judge.stopped(time.monotonic(), OPERATOR)
             self._pass(fault.seconds)
         else:
             self._let_the_mock(fault)
+
+    def _tell_news(self, role: str, fault: Fault) -> None:
+        """Somebody tells of the marsh, that there is a clue or that it is not to be flown over, and takes it back."""
+        shape = {"type": "Polygon", "coordinates": [ground.ring(ground.MARSH)]}
+        properties = {"role": role, **fault.options}
+        told = self._post("/api/news", {"type": "Feature", "properties": properties, "geometry": shape})
+        if role == "exclude":
+            self.judge.excluded(time.monotonic())
+        self._pass(fault.seconds)
+        self.judge.excluded(math.inf)
+        if told is not None:
+            self._post(f"/api/news/{told['id']}/withdraw", {})
+
+    def _lock_the_journal(self, seconds: float) -> None:
+        """Another program writes to the journal, and is in no hurry."""
+        journal = self._alive_runs()[0] / "journal.sqlite"
+        with contextlib.closing(sqlite3.connect(journal, timeout=10.0, isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            self._pass(seconds)
+            other.execute("ROLLBACK")
 
     def _let_the_mock(self, fault: Fault) -> None:
         """A fault of the mock's, under its own name."""
@@ -345,13 +384,19 @@ class SoakFlight:
 
     def _order(self, command: str) -> None:
         self.judge.ordered(time.monotonic())
-        try:
-            httpx.post(f"{self._url}/api/commands", json={"command": command}, timeout=40.0)
-        except httpx.HTTPError as error:
-            self._wait_for_the_end(30.0)  # an order that comes when the run ends finds the door shut
-            if self._service.process.poll() is None:
-                raise Trouble(f"the order '{command}' was not taken: {error}") from error
+        self._post("/api/commands", {"command": command}, refused=True)
         self.judge.ordered(time.monotonic())
+
+    def _post(self, path: str, body: dict[str, Any], *, refused: bool = False) -> Any:
+        """What the door answers; None when the run has ended. `refused`: it may refuse, which is an answer, too."""
+        try:
+            answer = httpx.post(self._url + path, json=body, timeout=40.0)
+            return (answer if refused else answer.raise_for_status()).json()
+        except httpx.HTTPError as error:
+            self._wait_for_the_end(30.0)  # what comes when the run ends finds the door shut
+            if self._service.process.poll() is None:
+                raise Trouble(f"{path} did not take {body}: {error}") from error
+            return None
 
     def _wait_for_the_end(self, patience_s: float) -> None:
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -404,7 +449,8 @@ class SoakFlight:
         place = self.plan.target
         target = None if place is None else Target(place, frozenset(true_hits))
         for run in self._alive_runs() if hasattr(self, "_runs") else []:
-            outcome.violations += audit(run, acknowledged, told, target)
+            refuses = "command_refused" in outcome.faults
+            outcome.violations += audit(run, acknowledged, told, target, refuses=refuses)
         for word in _BAD_WORDS:
             if word in outcome.said:
                 line = next(line for line in outcome.said.splitlines() if word in line)

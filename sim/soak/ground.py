@@ -26,6 +26,7 @@ def ring(corners: Sequence[tuple[float, float]]) -> list[list[float]]:
 # An L of 260 x 200 m with something in it that is not flown over, and a launch point outside.
 FIELD = [(0.0, 0.0), (260.0, 0.0), (260.0, 200.0), (140.0, 200.0), (140.0, 110.0), (0.0, 110.0)]
 POND = [(60.0, 40.0), (100.0, 40.0), (100.0, 75.0), (60.0, 75.0)]
+MARSH = [(170.0, 20.0), (205.0, 20.0), (205.0, 60.0), (170.0, 60.0)]  # told in flight, and taken back
 LAUNCH = (-20.0, 10.0)
 CELL_M, HEIGHT_M, GROUND_AMSL_M, MARGIN_M = 20.0, 15.0, 400.0, 30.0
 ENDURANCE_S = 600.0  # of the aircraft's battery
@@ -94,7 +95,9 @@ _AREA, _POND = shapely.Polygon(FIELD), shapely.Polygon(POND)
 _SEARCH = _AREA.buffer(MARGIN_M + 2.0)
 _WAY = shapely.union_all([_AREA, _POND, shapely.Point(LAUNCH)]).convex_hull.buffer(MARGIN_M + 2.0)
 _LOW = 0.6  # of the height it searches at
-_KEPT_OUT = _POND.buffer(-2.0)  # the service keeps 5 m; positions on the wire are as old as the wire is slow
+_SLACK_M, _INSIDE_M = 2.0, 6.0  # the service keeps 5 m; positions on the wire are as old as the wire is slow
+_KEPT_OUT = _POND.buffer(-_SLACK_M)
+_MARSH = shapely.Polygon(MARSH)
 
 
 def rise(here: LatLon, *, hill: bool) -> float:
@@ -123,8 +126,8 @@ def wrong_height(there: LatLon, up: float, *, hill: bool) -> str:
     return "" if lowest <= above <= highest else f"{above:.1f} m above the ground"
 
 
-def why_not(here: LatLon, there: LatLon, *, searching: bool) -> str:
-    """Why an aircraft at one place must not be sent to another, or nothing."""
+def why_not(here: LatLon, there: LatLon, *, searching: bool, marsh: bool = False) -> str:
+    """Why an aircraft at one place must not be sent to another, or nothing; `marsh`: that is excluded by now."""
     start, end = shapely.Point(metres(here)), shapely.Point(metres(there))
     leg = shapely.LineString([start, end])
     zone = _SEARCH if searching else _WAY
@@ -132,8 +135,10 @@ def why_not(here: LatLon, there: LatLon, *, searching: bool) -> str:
         return f"{end.distance(_AREA):.0f} m outside the area"
     if _WAY.contains(start) and not _WAY.contains(leg):
         return "the leg leaves the way from and to the area"
-    if leg.intersects(_KEPT_OUT) and not _POND.buffer(6.0).contains(start):
-        return "the leg crosses the pond"
-    if _KEPT_OUT.contains(end):
-        return "in the pond"
+    for name, water in (("pond", _POND), ("marsh", _MARSH))[: 2 if marsh else 1]:
+        kept_out = water.buffer(-_SLACK_M)
+        if leg.intersects(kept_out) and not water.buffer(_INSIDE_M).contains(start):
+            return f"the leg crosses the {name}"
+        if kept_out.contains(end):
+            return f"in the {name}"
     return ""

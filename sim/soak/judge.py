@@ -27,6 +27,7 @@ _LEAST_PERCENT = 15.0  # the service goes home at 20
 _UNKNOWN_S = 30.0  # without a level for so long, it is not known on the ground
 _SETTLED_S = 25.0  # a search has reached its height after so long
 _NEAR_M = 60.0  # a stop lies this far ahead at most
+_ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 _BRAKE = 17  # ArduCopter's mode
 _STAND_STILL = "SET_POSITION_TARGET_LOCAL_NED"
 OPERATOR = "the operator's hold"
@@ -75,6 +76,7 @@ class Judge:
         self._too_close = False
         self._braked = False  # and not flown on since
         self._crashed = False
+        self._marsh_since = math.inf
         self.steady = False  # nothing goes on that may lower the aircraft
         self.during = ""  # the fault that came last
 
@@ -113,6 +115,11 @@ class Judge:
                 self._see(f"closer than allowed in {self.state}: {too_close}")
             self._too_close = bool(too_close)
 
+    def excluded(self, since: float) -> None:
+        """The marsh is excluded since then (monotonic); infinite: not any more."""
+        with self._lock:
+            self._marsh_since = since
+
     def started_over(self) -> None:
         """The service is another process now."""
         with self._lock:
@@ -130,6 +137,9 @@ class Judge:
             elif message.get_type() in ("SYS_STATUS", "BATTERY_STATUS"):
                 if message.battery_remaining >= 0:
                     self._level = (float(message.battery_remaining), now)
+            elif message.get_type() == "COMMAND_ACK":
+                if message.command == mavlink.MAV_CMD_DO_REPOSITION and message.result != _ACCEPTED:
+                    self._stop = None  # it has not stopped there: the next stop is where it can by then
             elif message.get_type() == "HEARTBEAT":
                 self._armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
                 self._heard_mode(message.custom_mode == self._guided_mode, now)
@@ -231,7 +241,10 @@ class Judge:
                 found.append("a stop far away")
         else:
             searching = self.state in ("SEARCHING", "CONFIRMING")
-            objections = [ground.why_not(here, there, searching=searching) for here in self._positions]
+            marsh = now - self._marsh_since > self._late_s
+            objections = [
+                ground.why_not(here, there, searching=searching, marsh=marsh) for here in self._positions
+            ]
             if objections and all(objections):
                 found.append(objections[-1])
             below = [*self._grounds, *self._homes] or [

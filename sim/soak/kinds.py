@@ -58,6 +58,7 @@ _LIES: tuple[
     tuple[str, str, float, int], ...
 ] = (  # message, field, value, how often (0: as long as it lasts)
     ("GLOBAL_POSITION_INT", "hdg", 65535, 0),
+    ("GLOBAL_POSITION_INT", "vx", 32767, 0),
     ("GLOBAL_POSITION_INT", "time_boot_ms", 4294967295, 1),
     ("GLOBAL_POSITION_INT", "lat", 2147483647, 1),
     ("SYS_STATUS", "battery_remaining", -1, 0),
@@ -76,6 +77,25 @@ def _stream(rng: Generator) -> Options:
 def _lie(rng: Generator) -> Options:
     message, field, value, times = _LIES[int(rng.integers(len(_LIES)))]
     return {"message": message, "field": field, "value": value, "times": times}
+
+
+_SHIFTS = (  # message, field, by how much in its own unit
+    ("GLOBAL_POSITION_INT", "hdg", 9000.0),
+    ("GLOBAL_POSITION_INT", "vx", 300.0),
+    ("ATTITUDE", "yaw", 1.5),
+    ("GPS_RAW_INT", "satellites_visible", -6.0),
+)
+_REFUSED = ("MAV_CMD_DO_REPOSITION", "MAV_CMD_DO_CHANGE_SPEED", "MAV_CMD_DO_SET_MODE")
+
+
+def _shift(rng: Generator) -> Options:
+    message, field, by = _SHIFTS[int(rng.integers(len(_SHIFTS)))]
+    return {"message": message, "field": field, "by": by}
+
+
+def _refusal(rng: Generator) -> Options:
+    results = ["TEMPORARILY_REJECTED", "DENIED", "FAILED", "ACCEPTED"]
+    return {"command": str(rng.choice(_REFUSED)), "result": str(rng.choice(results))}
 
 
 def _metres(least: float, most: float, name: str) -> Callable[[Generator], Options]:
@@ -116,6 +136,10 @@ KINDS: dict[str, Kind] = {
     "gps_jump": Kind(2, (3, 30), _jump),
     "ekf_bad": Kind(1, (1, 6)),
     "wind": Kind(2, (15, 60), _wind),
+    "battery_drains": Kind(0.5, (30, 60), lambda rng: {"percent_per_s": float(rng.uniform(0.2, 0.6))}),
+    "battery_critical": Kind(
+        0.5, (10, 20), lambda rng: {"action": str(rng.choice(["return", "land", "warn"]))}, last=True
+    ),
     "battery": Kind(0.5, (0, 0), lambda rng: {"percent": float(rng.uniform(10, 60))}),
     "reboot": Kind(0.5, (0, 0), last=True),
     # who is in charge
@@ -133,12 +157,18 @@ KINDS: dict[str, Kind] = {
     "bad_requests": Kind(1, (2, 10)),
     # the operator
     "operator_holds": Kind(1, (2, 20)),
+    # news from the field
+    "clue": Kind(1, (5, 20), lambda rng: {"bayes_factor": float(rng.choice([0.1, 20.0]))}),
+    "exclude": Kind(1, (20, 60)),
     # our own process
     "stall": Kind(2, (0, 0), lambda rng: {"wall_s": float(rng.uniform(0.3, 5.0))}),
     "killed": Kind(2, (0, 0)),
+    "journal_locked": Kind(1, (5, 40)),
     # what the vehicle tells
     "one_way": Kind(1, (2, 20), lambda rng: {"carries": str(rng.choice(["down", "up"]))}),
     "stream_stops": Kind(2, (5, 40), _stream),
+    "field_shifts": Kind(1, (5, 30), _shift),
+    "command_refused": Kind(1, (5, 30), _refusal),
     "stream_freezes": Kind(2, (5, 40), _stream),
     "field": Kind(2, (5, 30), _lie),
     "second_battery": Kind(0.5, (10, 40), lambda rng: {"percent": float(rng.uniform(50, 90))}),
@@ -186,8 +216,15 @@ AT_BOOT: dict[str, Options] = {
     "arming_refused": {"kind": "arming_refused", "at": 0.0, "seconds": 20.0},
     "pilot_arms_with_it": {"kind": "pilot", "after_arming": 0.0, "seconds": 2.0},
     "unknown_battery": {"kind": "battery_unknown", "at": 0.0, "seconds": 30.0},
+    "one_way_from_the_start": {"kind": "one_way", "at": 0.0, "seconds": 20.0},
+    "link_lost_in_the_climb": {"kind": "link_lost", "after_arming": 2.0, "seconds": 8.0},
+    "gps_lost_in_the_climb": {"kind": "gps_lost", "after_arming": 3.0, "seconds": 6.0},
+    "pilot_in_the_climb": {"kind": "pilot", "after_arming": 3.0, "seconds": 4.0},
 }
 """What is so from the start, as the mock's file of faults has it."""
+
+WITH_A_HOLD = frozenset({"operator_holds", "killed_while_held", "killed_while_yielded"})
+"""Kinds that stop the aircraft themselves, or let its pilot do so, before anything goes wrong."""
 
 GROUNDS: dict[str, str] = {"no_landed_state": "does not tell whether it is in the air"}
 """With these the aircraft must not leave the ground, and the service must say why: these words."""

@@ -6,24 +6,29 @@ Times are in seconds of the vehicle's clock, but for those of our own process (`
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sim.soak.kinds import AT_BOOT, EVERY, GROUNDS, KINDS, Options
+from sim.soak.kinds import AT_BOOT, EVERY, GROUNDS, KINDS, WITH_A_HOLD, Options
 
 NUMBERS, SHARES = (1, 2, 3), (0.7, 0.15, 0.15)
 """How many aircraft fly, and how often."""
+SEARCH, HOLD, HOME = "search", "hold", "home"
+"""When a fault comes: while the aircraft searches, while an operator holds it, on its way home."""
+_HELD, _HOMEWARD = 0.15, 0.4
+"""How many of the faults come during a hold, and how many flights have their last one on the way home."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that goes wrong: `wait_s` after the last one was over, for `seconds`."""
+    """One thing that goes wrong: `wait_s` after the last one was over, for `seconds`, and in what `moment`."""
 
     kind: str
     wait_s: float
     seconds: float
     options: Options = field(default_factory=dict)
+    moment: str = SEARCH
 
 
 @dataclass(frozen=True)
@@ -56,9 +61,12 @@ def draw_plan(seed: int, ground: Mapping[str, float], faults: int, kinds: Set[st
         name = str(rng.choice(names, p=weights / weights.sum()))
         kind = KINDS[name]
         wait, lasts = float(rng.uniform(4, 25)), float(rng.uniform(*kind.seconds))
-        drawn.append(Fault(name, wait, lasts, kind.options(rng)))
+        held = rng.random() < _HELD and name not in WITH_A_HOLD
+        drawn.append(Fault(name, wait, lasts, kind.options(rng), HOLD if held else SEARCH))
         if kind.last:
             break
+    if drawn and rng.random() < _HOMEWARD and drawn[-1].kind not in WITH_A_HOLD:
+        drawn[-1] = replace(drawn[-1], moment=HOME)
     if target is None and any(fault.kind in ("detector_lies", "clock_steps") for fault in drawn):
         target = _place(rng, ground)  # so that there is something to be wrong about
     at_boot, hill = _at_boot(rng, kinds), bool(rng.random() < 0.5)

@@ -10,9 +10,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Locator, expect
 
+from service.evidence.reports import OrderReceipt
 from service.mission.states import State
 from service.view.next import STATE_WORDS
 from tests.service.http.door import REPORT, both_tokens
+from tests.service.test_squad import in_the_air_and_on_the_ground
 
 from .hands import PHONE
 from .scripted import PHONE_FIX, RUIN, Scripted, Served, orders, served
@@ -108,6 +110,63 @@ def test_one_order_that_is_always_there_holds_them_all(watch: Watch, search: Ser
     hold.click()
     expect(watch.page.locator("#toast")).to_have_text("It holds still")
     assert search.run.ordered == [("hold", None)]
+
+
+class ByASquad(Scripted):
+    """One whose orders are carried out by the cores of an aircraft that searches and of one on the ground."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.flies, self.stands, self.squad = in_the_air_and_on_the_ground()
+        self.show()
+
+    def show(self) -> None:
+        """Both as they are now."""
+        both = enumerate((self.flies, self.stands), 1)
+        self.tell(aircraft=[craft(self, number, talk.state) for number, talk in both])
+
+    async def order(self, command: str, *_: Any, **__: Any) -> OrderReceipt:
+        receipt = await self.squad.order(command)
+        self.show()
+        return receipt
+
+
+def test_to_hold_them_all_is_not_told_as_refused_because_one_stands_on_the_ground(chromium: Browser) -> None:
+    with served(ByASquad()) as search:
+        watch = Watch(chromium, search.url)
+        expect(panel(watch, "2").locator(".chip")).to_have_text(STATE_WORDS[State.GROUNDED])
+        watch.order("Hold all").click()
+        expect(watch.page.locator("#toast")).to_have_text("It holds still")
+        expect(panel(watch, "1").locator(".chip")).to_have_text(STATE_WORDS[State.HOLDING])
+        expect(panel(watch, "2").locator(".chip")).to_have_text(STATE_WORDS[State.GROUNDED])
+        watch.close()
+
+
+@pytest.mark.parametrize(
+    ("button", "title", "warns", "ordered"),
+    [
+        ("Launch aircraft 3", "Aircraft 3: Take off?", "Nobody may be near it", ("launch", "3")),
+        ("Finish", "Finish the search?", "no further flight follows", ("finish", None)),
+    ],
+)
+def test_a_launch_and_the_finish_are_asked_first(
+    watch: Watch, search: Served, button: str, title: str, warns: str, ordered: tuple[str, str | None]
+) -> None:
+    search.run.tell(
+        aircraft=[craft(search.run, 1, State.SEARCHING), craft(search.run, 3, State.GROUNDED, name="3")]
+    )
+    expect(panel(watch, "3").locator(".chip")).to_have_text(STATE_WORDS[State.GROUNDED])
+    pressed = watch.page.get_by_role("button", name=button, exact=True)
+    for answer, result in (("Cancel", []), (ordered[0].title(), [ordered])):
+        pressed.click()
+        dialog = watch.page.get_by_role("dialog")
+        expect(dialog.get_by_role("heading")).to_have_text(title)
+        expect(dialog).to_contain_text(warns)
+        dialog.get_by_role("button", name=answer).click()
+        expect(dialog).to_have_count(0)
+        if result:
+            expect(watch.page.locator("#toast")).not_to_be_empty()
+        assert search.run.ordered == result
 
 
 def test_each_is_on_the_map_in_its_colour_with_its_name_its_track_and_its_plan(

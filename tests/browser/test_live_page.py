@@ -217,13 +217,30 @@ def test_news_are_told_on_the_page_and_taken_back_with_one_click(watch: Watch, s
     expect(item).to_contain_text("red <b>hat</b>")
     (news,) = stage.state()["news"]
     assert (news["role"], news["words"]) == ("clue", "red <b>hat</b>")
+    drawn = page.locator("#map path.told.clue")
+    expect(drawn).to_have_count(1)
+    layer = page.get_by_label("news from the field", exact=True)
+    layer.set_checked(False)
+    expect(drawn).to_have_count(0)
+    layer.set_checked(True)
+    expect(drawn).to_have_count(1)
     assert watch.violations() == []
     page.get_by_role("button", name="Take back").click()
     expect(item).to_have_count(0)
+    expect(drawn).to_have_count(0)
     assert stage.state()["news"] == []
     page.locator("#news-role").select_option("exclude")
     expect(page.get_by_label("Likelier if the target is there, times")).to_be_hidden()
     expect(page.get_by_label("Not within, metres")).to_be_visible()
+    page.locator("#news-role").select_option("refute")
+    expect(page.get_by_label("Latitude")).to_be_hidden()
+    page.get_by_label("Words").fill("another phone")
+    page.get_by_role("button", name="Tell", exact=True).click()
+    expect(item).to_contain_text("not assumed any more")
+    (news,) = stage.state()["news"]
+    assert (news["role"], news["geometry"]) == ("refute", None)
+    page.get_by_role("button", name="Take back").click()
+    expect(item).to_have_count(0)
 
 
 def probability(stage: Stage, row: int, col: int) -> float:

@@ -43,6 +43,7 @@ def test_a_seed_is_a_flight_and_every_kind_of_fault_comes() -> None:
     assert str(plans) == str(again)  # nan is not nan
     assert {fault.kind for plan in plans for fault in plan.faults} == set(KINDS)
     assert {plan.at_boot for plan in plans} == set(AT_BOOT)
+    assert {plan.aircraft for plan in plans} == {1, 2, 3}
     for plan in plans:
         if any(fault.kind == "detector_lies" for fault in plan.faults):
             assert plan.target is not None

@@ -6,11 +6,13 @@ import json
 from contextlib import ExitStack
 from pathlib import Path
 
+import httpx
 import pytest
 
 from service.journal import read_rows
 from service.packing import pack
 from sim.autopilot.process import AutopilotProcess
+from tests.integration.flight import only_report, running, service_words, write_area
 from tests.integration.scene import flight
 from tests.integration.test_restart import comes_to, restarted, the_run
 from tests.integration.test_resume import replayed
@@ -79,3 +81,31 @@ def test_a_fresh_battery_is_noticed_and_another_aircraft_flies_on_after_an_order
     assert heard == [(1, "ardupilot"), (7, "px4")]
     (order,) = read_rows(scene.journal, "replaced")
     assert order.body == {"system_id": 7, "was_system_id": 1, "was_autopilot": "ardupilot"}
+
+
+DEMO = """
+[demo]
+target = false
+endurance_min = 2.5
+swap_battery_s = 10
+[flight]
+full_battery_s = 150
+"""
+
+
+def test_the_built_in_world_flies_one_sortie_after_another_by_itself(tmp_path: Path) -> None:
+    settings = tmp_path / "settings.toml"
+    settings.write_text(DEMO, encoding="utf-8")
+    words = service_words(
+        write_area(tmp_path), tmp_path / "runs", "--config", str(settings), "--speedup", "20"
+    )
+    with running(*words) as service:
+        address = service.wait_for(r"listening on (http://\S+)").group(1)
+        with httpx.Client(base_url=address, timeout=30.0) as door:
+            service.wait_for(r"(?s)(RETURNING → GROUNDED.*){2}", 300.0)
+            door.post("/api/commands", json={"command": "finish"}).raise_for_status()
+        assert service.exit_code() == 3, service.said
+    report = only_report(tmp_path / "runs")
+    first, second = report["sorties"][:2]
+    assert (first["number"], second["number"]) == (1, 2)
+    assert all("battery" in each["why"] and each["flight_time_s"] > 20.0 for each in (first, second))

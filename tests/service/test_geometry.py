@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.geometry import distance_m, moved, offset_m, turn_deg, wrapped_deg
+from service.geometry import between, distance_m, moved, offset_m, turn_deg, wrapped_deg
 
 GEOD = pyproj.Geod(ellps="WGS84")
 NEAR = st.floats(-3000.0, 3000.0)
@@ -37,3 +37,11 @@ def test_the_way_over_the_antimeridian_is_short() -> None:
 def test_an_angle_in_its_range_stays_to_the_last_bit(angle: float) -> None:
     assert wrapped_deg(angle) == angle
     assert -180.0 <= turn_deg(angle, 0.0) < 180.0
+
+
+def test_a_place_between_two_on_both_sides_of_the_antimeridian_lies_between_them() -> None:
+    start, end = (10.0, 179.999), (10.002, -179.999)
+    lat, lon = between(start, end, 0.75)
+    assert (lat, lon) == pytest.approx((10.0015, -179.9995))
+    assert between(start, end, 1.0) == pytest.approx(end)
+    assert between((47.0, 8.0), (47.4, 8.8), 0.25) == pytest.approx((47.1, 8.2))

@@ -12,7 +12,7 @@ from service.chances import sure
 from service.evidence.found import Found
 from service.evidence.observe import Observation
 from service.mission.states import State
-from service.report import in_words, outcome_of, place_known, track_geojson
+from service.report import by_sortie, in_words, outcome_of, place_known, track_features, track_geojson
 from service.search import Search
 from tests.service.export.recorded import SETTINGS, field_grid
 
@@ -94,3 +94,21 @@ def test_a_place_that_was_found_is_the_position_whatever_the_belief_has_become(t
     known = place_known("found", search, HERE)
     assert (known["position"], known["probability"]) == ({"lat": 47.0, "lon": 11.0}, 0.97)
     assert (known["ellipse"], known["sigma_m"]) == (HERE.ellipse, HERE.sigma_m)
+
+
+TRACK = [(float(second), 47.0, 11.0 + second * 1e-5, 30.0) for second in range(10)]
+
+
+def test_a_track_is_cut_at_each_landing() -> None:
+    parts = by_sortie(TRACK, [3.0, 6.5])
+    assert [[point[0] for point in part] for part in parts] == [[0, 1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    assert by_sortie(TRACK, []) == [TRACK]
+
+
+def test_each_sortie_is_a_line_with_its_number_and_one_of_a_single_point_is_none() -> None:
+    features = track_features(TRACK, [3.0, 4.0], "kite")
+    told = [(each["properties"]["sortie"], each["properties"]["aircraft"]) for each in features]
+    assert told == [(1, "kite"), (3, "kite")]
+    assert [len(each["geometry"]["coordinates"]) for each in features] == [4, 5]
+    assert features[1]["properties"]["times"] == [5.0, 6.0, 7.0, 8.0, 9.0]
+    assert "aircraft" not in track_features(TRACK, [])[0]["properties"]

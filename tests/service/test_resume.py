@@ -108,6 +108,11 @@ def test_a_run_that_is_over_is_not_gone_on_with(tmp_path: Path) -> None:
         ([*UP, ("SEARCHING", "abort", "ABORTED")], State.SEARCHING),
         (FOUND, State.RETURNING),
         ([*LOW, LANDED], State.WAITING),
+        ([("WAITING", "hold", "WAITING")], State.HOLDING),  # ordered before it was heard
+        ([("WAITING", "hold", "WAITING"), ("WAITING", "linked", "READY")], State.HOLDING),
+        ([*UP, ("WAITING", "return", "WAITING")], State.RETURNING),
+        ([*UP, ("WAITING", "finish", "WAITING")], State.RETURNING),
+        ([*TAKEN, ("WAITING", "hold", "WAITING")], State.YIELDED),
     ],
 )
 def test_a_run_is_taken_up_as_it_was_left(steps: Sequence[Step], state: State, tmp_path: Path) -> None:
@@ -132,6 +137,30 @@ def test_a_search_that_an_operator_finished_on_the_way_home_stays_finished_acros
     assert not left_standing(journal_of(tmp_path / "not", LOW), Search(GRID, Settings())).settled
 
 
+def test_a_search_that_news_ended_and_were_taken_back_goes_on_across_a_kill(tmp_path: Path) -> None:
+    again = ("RETURNING", "resume", "RETURNING")
+    settled = left_standing(journal_of(tmp_path / "a", SEARCHED), Search(GRID, Settings()))
+    assert (settled.settled, settled.enough) == (True, True)
+    steps = [*SEARCHED, again]
+    standing = left_standing(journal_of(tmp_path / "b", steps), Search(GRID, Settings()))
+    assert (standing.state, standing.settled, standing.enough) == (State.RETURNING, False, False)
+    assert why_over(journal_of(tmp_path / "c", [*steps, LANDED])) == ""
+    assert not left_standing(
+        journal_of(tmp_path / "d", [*SEARCHED, FINISHED]), Search(GRID, Settings())
+    ).enough
+
+
+def test_a_search_is_not_said_to_be_finished_by_an_operator_who_has_not_asked(tmp_path: Path) -> None:
+    for number, (why, told) in enumerate(
+        {
+            "searched to POS 95 %": "searched to POS 95 %",
+            "the operator asked": "the operator finished the search",
+        }.items()
+    ):
+        steps = [("WAITING", "linked", "READY"), ("READY", "finish", "DONE")]
+        assert why_over(journal_of(tmp_path / str(number), steps, why=why)) == told
+
+
 def test_what_was_flown_goes_on_across_processes(tmp_path: Path) -> None:
     track = [[1001.0, 47.0, 8.3, 15.0], [1002.0, 47.0001, 8.3, 15.0]]
     first = {"seconds": 40.0, "earlier_s": 0.0, "steps": 3, "track": track}
@@ -147,6 +176,7 @@ def test_what_was_flown_goes_on_across_processes(tmp_path: Path) -> None:
     assert (flight.seconds(5000.0), flight.steps, flight.decisions, flight.waypoints) == (45.0, 5, 1, 1)
     assert len(flight.track) == 3
     assert flight.flown
+    assert flight.goal == (47.0, 8.3)
 
 
 def test_who_flew_what_and_how_far_the_rows_tell_is_taken_up(tmp_path: Path) -> None:

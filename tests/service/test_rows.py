@@ -10,6 +10,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
+import shapely
 
 from roisearch import Regions
 from service.drawing import Drawing, RegionsRow
@@ -87,6 +88,25 @@ ROWS: list[KnownRow] = [
     ReplacedRow(7, 1, "px4"),
     SortieRow(2, 1700.5, 0.1 + 0.2, 37, 0.25, "battery at 20 %", 7, "ardupilot"),
     SortieRow(1, 900.0, 61.5, 12, 0.125, "the operator asked to return"),
+    NewsRow(
+        FieldNews(
+            "n2",
+            "exclude",
+            "",
+            (47.0, 11.0),
+            np.empty((0, 2), dtype=np.int64),
+            np.empty(0),
+            shapely.MultiPolygon(
+                [
+                    (
+                        ((10.0, 46.0), (12.0, 46.0), (12.0, 48.0), (10.0, 46.0)),
+                        [((11.1, 46.2), (11.5, 46.2), (11.5, 46.4), (11.1, 46.2))],
+                    ),
+                    (((13.0, 46.0), (14.0, 46.0), (14.0, 47.1), (13.0, 46.0)), []),
+                ]
+            ),
+        )
+    ),
     NewsRow(FieldNews("n1", "clue", "a glove", (47.0, 11.0), np.array([[1, 2]]), np.array([0.1 + 0.2]))),
     WithdrawnRow("n1"),
     RegionsRow(Drawing.of(3, REGIONS, ("the burn", "open ground"), "region 1 (the burn) is spent")),

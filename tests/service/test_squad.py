@@ -23,13 +23,15 @@ from service.journal import Journal
 from service.mavlink.events import Home
 from service.mavlink.telemetry import Telemetry
 from service.mission.chart import Chart
+from service.mission.effects import Answer
 from service.mission.mission import Mission
+from service.mission.news import Order
 from service.mission.standing import Terms
-from service.mission.states import FINAL, State
+from service.mission.states import FINAL, Event, State
 from service.news.bearing import FieldNews
 from service.search import Search
 from service.squad import Squad
-from tests.service.mission.flown import CELL_M, FOUND, GRID, place, reached
+from tests.service.mission.flown import CELL_M, FOUND, GRID, ON_GROUND, Talk, place, reached
 
 SETTINGS = Settings.model_validate(
     {"sensor": {"cell_m": CELL_M}, "aircraft": [{"name": "north", "sources": ["cam0"]}, {"name": "south"}]}
@@ -45,6 +47,7 @@ class StandIn:
         self.wanted_system: int | None = None
         self.reports: list[Report] = []
         self.refusal = ""
+        self.means_something = True
         self.judgements: list[bool] = []
         self.found: object | None = None
         self.flight = SimpleNamespace(hits=[])
@@ -57,6 +60,9 @@ class StandIn:
         self.orders.append(command)
         self.wanted_system = system_id
         return OrderReceipt(state=self.state, refused=self.refusal or None)
+
+    def concerned(self, command: str) -> bool:
+        return self.means_something
 
     async def judged(self, *, confirmed: bool) -> OrderReceipt:
         self.judgements.append(confirmed)
@@ -107,12 +113,53 @@ def test_one_that_has_ended_gets_no_more_orders_and_who_refuses_is_named() -> No
     assert receipt.refused == "south: there is nothing to return in READY"
 
 
-def test_an_aircraft_is_taken_back_from_its_pilot_by_its_name_only() -> None:
+@pytest.mark.parametrize("command", ["resume", "return", "launch"])
+def test_an_aircraft_is_taken_back_from_its_pilot_by_its_name_only(command: str) -> None:
     north, south, both = two(State.HOLDING, State.YIELDED)
-    assert "name the aircraft" in str(asyncio.run(both.order("resume")).refused)
-    assert north.orders == south.orders == []
-    asyncio.run(both.order("resume", aircraft="south"))
-    assert south.orders == ["resume"]
+    refused = asyncio.run(both.order(command)).refused
+    assert refused == "south: its pilot has it, and only an order that names it takes it back"
+    assert (north.orders, south.orders) == ([command], [])
+    asyncio.run(both.order(command, aircraft="south"))
+    assert south.orders == [command]
+
+
+def in_the_air_and_on_the_ground() -> tuple[Talk, Talk, Squad]:
+    """The squad of a mission that searches and of one between two sorties, with their real cores."""
+
+    class WithACore(StandIn):
+        def __init__(self, name: str, talk: Talk) -> None:
+            super().__init__(name, Search(GRID, SETTINGS), talk.state)
+            self.talk = talk
+
+        def concerned(self, command: str) -> bool:
+            return self.talk.core.concerned(command, self.talk.seen)
+
+        async def order(self, command: str, *_: Any, **__: Any) -> OrderReceipt:
+            did = self.talk.on(Order(command, 7))
+            refused = next((each.refused for each in did if isinstance(each, Answer)), "")
+            return OrderReceipt(state=self.talk.state, refused=refused or None)
+
+    flies, stands = reached(State.SEARCHING), reached(State.GROUNDED)
+    stands.shows(**ON_GROUND)
+    return flies, stands, squad(WithACore("north", flies), WithACore("south", stands))
+
+
+@pytest.mark.parametrize(("command", "state"), [("hold", State.HOLDING), ("return", State.RETURNING)])
+def test_who_an_order_for_all_means_nothing_to_does_not_refuse_it(command: str, state: State) -> None:
+    flies, stands, both = in_the_air_and_on_the_ground()
+    assert asyncio.run(both.order(command)).refused is None
+    assert (flies.state, stands.state) == (state, State.GROUNDED)
+
+
+def test_an_order_that_one_refuses_or_that_means_nothing_to_any_is_refused() -> None:
+    flies, _, both = in_the_air_and_on_the_ground()
+    assert "there is nothing to resume in GROUNDED" in str(
+        asyncio.run(both.order("resume", aircraft="south")).refused
+    )
+    assert "--takeoff" in str(asyncio.run(both.order("launch")).refused)  # south's alone
+    flies.happens(Event.RETURN)
+    flies.happens(Event.DOWN)
+    assert "there is nothing to hold" in str(asyncio.run(both.order("hold")).refused)
 
 
 def test_of_several_only_the_one_that_is_named_is_replaced() -> None:
@@ -199,11 +246,11 @@ def test_one_that_does_not_search_has_given_its_share_back(state: State, given: 
 class Silent(StandIn):
     """A mission that goes on for as long as it is let, with an aircraft that is not heard any more."""
 
-    def __init__(self, name: str, search: Search, state: State) -> None:
+    def __init__(self, name: str, search: Search, state: State, *, between: bool = False) -> None:
         super().__init__(name, search, state)
         self.clock = Clock(200.0)
         self.vehicle = SimpleNamespace(telemetry=Telemetry())
-        self.core = SimpleNamespace(terms=Terms())
+        self.core = SimpleNamespace(terms=Terms(), between_sorties=between)
         self.gone = asyncio.Event()
 
     async def run(self) -> None:
@@ -218,12 +265,20 @@ class Silent(StandIn):
         self.gone.set()
 
 
-@pytest.mark.parametrize(("state", "left"), [(State.SEARCHING, True), (State.GROUNDED, False)])
+@pytest.mark.parametrize(
+    ("state", "between", "left"),
+    [
+        (State.SEARCHING, False, True),
+        (State.WAITING, False, True),
+        (State.GROUNDED, True, False),
+        (State.WAITING, True, False),  # an earlier process left it between two sorties
+    ],
+)
 def test_one_that_is_silent_when_all_others_have_ended_is_left_but_on_the_ground_it_may_be_switched_off(
-    state: State, left: bool
+    state: State, between: bool, left: bool
 ) -> None:
     search = Search(GRID, SETTINGS)
-    north, south = Silent("north", search, State.DONE), Silent("south", search, state)
+    north, south = Silent("north", search, State.DONE), Silent("south", search, state, between=between)
 
     async def run() -> None:
         looks, ticking = [0], north.clock.sleep
@@ -244,8 +299,8 @@ def test_one_that_is_silent_when_all_others_have_ended_is_left_but_on_the_ground
 class WithAHome(StandIn):
     """One that hears news, and has a home beside the launch point."""
 
-    def __init__(self, name: str, home: Home) -> None:
-        super().__init__(name, Search(GRID, SETTINGS))
+    def __init__(self, name: str, home: Home, state: State = State.SEARCHING) -> None:
+        super().__init__(name, Search(GRID, SETTINGS), state)
         self.core = SimpleNamespace(chart=Chart(GRID))
         self.vehicle = SimpleNamespace(telemetry=Telemetry(home=home))
         self.heard: list[str] = []
@@ -257,20 +312,36 @@ class WithAHome(StandIn):
         """Nothing follows."""
 
 
-def test_an_exclusion_over_the_home_of_any_aircraft_is_refused_and_other_news_there_are_not() -> None:
+@pytest.mark.parametrize(
+    ("state", "away_m", "words"),
+    [
+        (State.SEARCHING, 0.0, "lies in it"),
+        (State.SEARCHING, 3.0, "lies 3 m from it, less than 5 m"),
+        (State.SEARCHING, 8.0, ""),
+        (State.DONE, 0.0, ""),
+    ],
+)
+def test_an_exclusion_over_or_beside_the_home_of_any_aircraft_is_refused_and_other_news_there_are_not(
+    state: State, away_m: float, words: str
+) -> None:
     homes = [place(250.0, 60.0), place(60.0, 60.0)]
     missions: Any = [
-        WithAHome(name, Home(*at, 400.0)) for name, at in zip(("north", "south"), homes, strict=True)
+        WithAHome("north", Home(*homes[0], 400.0)),
+        WithAHome("south", Home(*homes[1], 400.0), state),
     ]
     squad = Squad(missions, SETTINGS)
-    lat, lon = homes[1]
+    corners = [(60.0 + away_m, 50.0), (90.0, 50.0), (90.0, 70.0), (60.0 + away_m, 70.0)]
+    if not away_m:
+        corners[0], corners[3] = (50.0, 50.0), (50.0, 70.0)
+    around = shapely.MultiPolygon([shapely.Polygon([place(*each)[::-1] for each in corners])])
     nothing = np.zeros((0, 2), dtype=np.int64)
-    around = shapely.MultiPolygon([shapely.Point(lon, lat).buffer(1e-4)])
     for role in ("searched", "exclude"):
         news = FieldNews(role, role, "", homes[1], nothing, np.zeros(0), around)
-        if role == "exclude":
-            with pytest.raises(BadInput, match=r"the aircraft's home, .*, lies in it; move one of the two"):
+        if role == "exclude" and words:
+            with pytest.raises(
+                BadInput, match=rf"the home of aircraft south, .*, {words}; move one of the two"
+            ):
                 asyncio.run(squad.hear(news))
         else:
             asyncio.run(squad.hear(news))
-    assert missions[0].heard == ["searched"]
+    assert missions[0].heard == ["searched"] if words else ["searched", "exclude"]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from sim.autopilot.process import AutopilotProcess
-from sim.flights_together import JointOutcome, Together, told
+from sim.flights_together import TROUBLES, JointOutcome, Together, told
 from sim.separation import Separation, Watching, side_by_side
 
 HOME = (47.05, 8.3)
@@ -105,3 +106,10 @@ def test_a_search_together_is_good_when_it_is_found_and_nobody_came_too_near(
     one = flown(**changes)
     assert one.good == good
     assert all(each in told(one) for each in [*one.violations, *one.wrong])
+
+
+def test_every_trouble_befalls_one_by_the_seed_and_is_told() -> None:
+    drawn = [replace(SEARCH, seed=seed) for seed in range(1, 21)]
+    assert {each.trouble_kind for each in drawn} == set(TROUBLES)
+    assert replace(SEARCH, trouble=False).trouble_kind == ""
+    assert told(flown()).endswith(f"aircraft 3: {SEARCH.trouble_kind}")

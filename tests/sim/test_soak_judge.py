@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -91,6 +92,16 @@ def test_the_judge_lets_a_search_be() -> None:
     wire.state("RETURNING")
     assert wire.goes(-10.0, 50.0) != []  # straight through the pond
     assert wire.goes(130.0, 20.0) == []
+
+
+def test_ground_that_is_excluded_in_flight_is_judged_until_that_is_taken_back() -> None:
+    wire = Wire()
+    assert wire.goes(190.0, 40.0) == []
+    wire.judge.excluded(wire.now - 5.0)
+    (said,) = wire.goes(190.0, 40.0)
+    assert "in the marsh" in said
+    wire.judge.excluded(math.inf)
+    assert wire.goes(190.0, 40.0) == []
 
 
 @pytest.mark.parametrize("state", ["READY", "TAKEOFF", "YIELDED", "DONE"])

@@ -73,6 +73,7 @@ class Flown:
             "found": None,
             "pose": None,
             "ahead": [],
+            "news": [],
             "steps": 3,
             "flight_time_s": 4.0,
         }
@@ -108,14 +109,14 @@ class Flown:
 
     async def hear(self, request: NewsRequest) -> HeardState:
         self.news.append(request.news(self.ground.grid, request.id or "news-1"))
-        return {"id": self.news[-1].id, "status": "accepted", "cells": len(self.news[-1].cells)}
+        return {"id": self.news[-1].id, "status": "accepted", "cells": len(self.news[-1].cells), "notes": []}
 
     async def withdraw(self, name: str) -> HeardState:
         (back,) = [each for each in self.news if each.id == name] or [None]
         if back is None:
             raise BadInput(f"there is no news '{name}'")
         self.news.remove(back)
-        return {"id": name, "status": "withdrawn", "cells": len(back.cells)}
+        return {"id": name, "status": "withdrawn", "cells": len(back.cells), "notes": []}
 
 
 @asynccontextmanager

@@ -121,7 +121,8 @@ def test_news_pass_and_what_is_wrong_with_them_comes_back_in_words(tmp_path: Pat
     async def talk() -> None:
         async with behind_a_door(run, tmp_path) as client:
             heard = (await client.post("/api/news", json=feature)).json()
-            assert heard == {"id": "glove", "status": "accepted", "cells": len(run.news[0].cells)}
+            cells = len(run.news[0].cells)
+            assert heard == {"id": "glove", "status": "accepted", "cells": cells, "notes": []}
             refused = await client.post("/api/news", json=far)
             assert refused.status_code == 422
             assert "are longitude and latitude swapped?" in refused.json()["detail"]

@@ -86,10 +86,10 @@ class FakeRun:
         return OrderReceipt(state="HOLDING")
 
     async def hear(self, request: NewsRequest) -> HeardState:
-        return {"id": request.id or "news-1", "status": "accepted", "cells": 7}
+        return {"id": request.id or "news-1", "status": "accepted", "cells": 7, "notes": []}
 
     async def withdraw(self, name: str) -> HeardState:
-        return {"id": name, "status": "withdrawn", "cells": 7}
+        return {"id": name, "status": "withdrawn", "cells": 7, "notes": []}
 
 
 def settings(**values: Any) -> HttpSettings:

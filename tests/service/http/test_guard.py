@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 import socket
 from contextlib import closing
@@ -16,6 +17,7 @@ from service.errors import BadInput
 from service.http.address import bind, host_name
 from service.http.guard import local_address
 from service.http.rate import Buckets
+from service.news.request import EXAMPLES
 
 from .door import (
     COMMAND,
@@ -187,6 +189,26 @@ def test_json_with_a_character_set_is_json() -> None:
             ).status_code
 
     assert asyncio.run(once()) == 200
+
+
+@pytest.mark.parametrize(("path", "status"), [("/api/news", 200), ("/api/commands", 415)])
+def test_geojson_is_what_it_is_called_where_geojson_is_taken(path: str, status: int) -> None:
+    async def once() -> int:
+        async with in_memory(FakeRun()) as client:
+            headers = {"content-type": "application/geo+json"}
+            body = EXAMPLES["a clue at a point"] if path == "/api/news" else {"command": "hold"}
+            return (await client.post(path, content=json.dumps(body), headers=headers)).status_code
+
+    assert asyncio.run(once()) == status
+
+
+def test_news_are_taken_back_by_an_id_with_a_slash() -> None:
+    async def once() -> dict[str, Any]:
+        async with in_memory(FakeRun()) as client:
+            answer: dict[str, Any] = (await client.post("/api/news/team%2F3/withdraw")).json()
+            return answer
+
+    assert asyncio.run(once())["id"] == "team/3"
 
 
 @pytest.mark.parametrize("chunked", [False, True])

@@ -78,6 +78,23 @@ def test_a_waypoint_waits_while_somebody_else_may_just_have_given_one(flavor: st
 
 
 @FLAVORS
+def test_a_suspicion_that_nothing_follows_ends_and_never_keeps_a_stop_from_going_out(flavor: str) -> None:
+    rig = searching(flavor)
+    rig.now += 0.1
+    rig.peer.target = (LAT - 0.001, LON, ALT)
+    rig.say(rig.peer.position_target(rig.now))
+    rig.peer.target = None  # the stream stops
+    with pytest.raises(NotPermitted, match="somebody else"):
+        go(rig, LAT + 0.0006)
+    rig.forget()
+    rig.core.hold(rig.now)
+    rig.run(0.1)
+    assert len(rig.motion()) == 1
+    rig.run(5.5)
+    go(rig, LAT + 0.0006)
+
+
+@FLAVORS
 def test_who_was_overtaken_by_a_waypoint_on_its_way_gets_the_aircraft(flavor: str) -> None:
     rig = searching(flavor)
     go(rig, LAT + 0.0006)
@@ -235,3 +252,24 @@ def test_a_target_with_an_altitude_of_before_a_correction_is_not_repeated() -> N
     assert rig.messages("COMMAND_INT", REPOSITION) == []
     (given_up,) = rig.of(TargetNotTaken)
     assert given_up.reason == "sea level has moved"
+
+
+@FLAVORS
+@pytest.mark.parametrize(
+    "command",
+    [mavlink.MAV_CMD_DO_CHANGE_SPEED, mavlink.MAV_CMD_DO_REPOSITION, mavlink.MAV_CMD_DO_PAUSE_CONTINUE],
+)
+def test_who_is_answered_that_a_command_of_his_flies_the_aircraft_has_it(flavor: str, command: int) -> None:
+    """Which shows also where the autopilot does not name its target any more."""
+    rig = searching(flavor)
+    rig.peer.target = None
+    rig.say(rig.peer.ack(command, mavlink.MAV_RESULT_DENIED, target=(255, 190)))
+    rig.say(rig.peer.ack(command, mavlink.MAV_RESULT_ACCEPTED))  # to us
+    assert rig.of(TargetReplaced) == []
+    rig.forget()
+    rig.say(rig.peer.ack(command, mavlink.MAV_RESULT_ACCEPTED, target=(255, 190)))
+    rig.run(2.0)
+    (replaced,) = rig.of(TargetReplaced)
+    assert (replaced.found, replaced.by.partition(" (")[0]) == (None, "system 255, component 190")
+    assert not rig.core.in_control
+    assert rig.motion() == []

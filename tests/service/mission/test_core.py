@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from service.mavlink.events import Notice
 from service.mavlink.telemetry import Wind
 from service.mission.core import GIVEN_UP_AFTER
 from service.mission.effects import (
@@ -271,3 +272,14 @@ def test_a_wind_that_is_reckoned_leads_home_as_one_that_is_told() -> None:
         State.RETURNING,
         "wind of 13 m/s, more than 12 m/s",
     )
+
+
+def test_why_it_is_as_it_is_does_not_grow_with_every_notice() -> None:
+    talk = searching()
+    why = talk.core.standing.why
+    for number in range(500):
+        talk.on(Notice(talk.now, f"flies {number} m/s, asked for 5"))
+    said = talk.core.standing.why
+    assert said.startswith(why)
+    assert said.endswith("flies 499 m/s, asked for 5")
+    assert len(said) < 600

@@ -7,9 +7,11 @@ from typing import Any
 
 import pytest
 
-from service.mavlink.events import ArmedChanged
+from service.mavlink.events import ArmedChanged, ModeChanged
+from service.mavlink.modes import ModeKind
 from service.mavlink.telemetry import Home
-from service.mission.departing import AS_LEFT
+from service.mavlink.vehicle import climb_s
+from service.mission.departing import AS_LEFT, LACKS_S
 from service.mission.effects import (
     Answer,
     Arm,
@@ -28,9 +30,10 @@ from service.mission.flight import Flight
 from service.mission.news import Order
 from service.mission.standing import Standing
 from service.mission.states import Event, State, next_state
-from service.rows import CommandRow
+from service.rows import CommandRow, TransitionRow
 from sim.soak import ground
 from tests.service.mission.flown import LEFT_US, ON_GROUND, Talk, reached
+from tests.service.mission.test_grounded import grounded
 
 STEPS = [Connect(), WaitReady(), EnterGuided(), Arm(), TakeOff(15.0)]
 
@@ -345,6 +348,96 @@ def test_a_person_who_holds_before_the_take_off_is_obeyed() -> None:
     assert talk.core.doing is None
 
 
+def at_once(talk: Talk, command: str) -> str:
+    """What an order is answered with, at once."""
+    (answer,) = [each for each in talk.on(Order(command, 7)) if isinstance(each, Answer)]
+    return answer.refused
+
+
+def linked(talk: Talk) -> Talk:
+    """The aircraft is heard, and then a minute passes."""
+    talk.tick()
+    talk.done()
+    talk.pass_by(60.0)
+    return talk
+
+
+@pytest.mark.parametrize("command", ["hold", "return"])
+def test_a_person_who_stops_it_before_it_is_heard_is_obeyed_whatever_a_flag_says(command: str) -> None:
+    talk = Talk(may_take_off=True, **ON_GROUND)
+    talk.tick()
+    assert at_once(talk, command) == ""
+    linked(talk)
+    assert (talk.state, talk.core.doing) == (State.HOLDING, None)
+    assert not [effect for effect in talk.wanted if effect in STEPS[1:]]
+    talk.on(Order("launch", 7))
+    assert talk.doing() == WaitReady()
+
+
+def test_a_return_while_it_gets_ready_to_take_off_keeps_it_on_the_ground() -> None:
+    talk = prepared(1)
+    assert at_once(talk, "return") == ""
+    talk.pass_by(60.0)
+    assert (talk.state, talk.core.doing) == (State.HOLDING, None)
+
+
+@pytest.mark.parametrize(
+    ("left", "command", "comes_up"),
+    [
+        (State.SEARCHING, "hold", State.HOLDING),
+        (State.RETURNING, "hold", State.HOLDING),
+        (State.SEARCHING, "return", State.RETURNING),
+        (State.HOLDING, "return", State.RETURNING),
+        (State.SEARCHING, "finish", State.RETURNING),
+        (State.YIELDED, "hold", State.YIELDED),
+        (State.YIELDED, "return", State.YIELDED),
+    ],
+)
+def test_what_is_ordered_before_it_is_heard_again_in_the_air_is_done_then(
+    left: State, command: str, comes_up: State
+) -> None:
+    flight = Flight(flown=True, carried_s=60.0, left_at=990.0)
+    talk = Talk(may_take_off=True, standing=Standing(state=left), flight=flight, in_control=False)
+    talk.tick()
+    assert bool(at_once(talk, command)) == (left == State.YIELDED)
+    talk.tick()
+    talk.done()
+    talk.pass_by(2.0)
+    if talk.core.doing == EnterGuided(there=True):
+        talk.shows(in_control=True)
+        talk.done()
+        talk.tick()
+    assert talk.state == comes_up
+    assert talk.core.standing.settled == (command == "finish")
+
+
+def test_one_that_is_not_heard_when_the_search_is_over_for_all_flies_home_once_it_is() -> None:
+    flight = Flight(flown=True, carried_s=60.0, left_at=990.0)
+    talk = Talk(standing=Standing(state=State.SEARCHING), flight=flight, in_control=False)
+    talk.sees(over="found")
+    talk.pass_by(2.0)
+    assert talk.state == State.WAITING
+    linked_rows = [row for row in talk.rows if isinstance(row, TransitionRow)]
+    assert [(row.event, row.after) for row in linked_rows] == [(Event.FINISH, State.WAITING)]
+    talk.done()
+    talk.pass_by(2.0)
+    talk.shows(in_control=True)
+    talk.done()
+    talk.tick()
+    assert (talk.state, talk.core.standing.settled) == (State.RETURNING, True)
+
+
+def test_one_that_was_held_and_is_not_heard_when_the_search_is_over_for_all_stays_held() -> None:
+    flight = Flight(flown=True, carried_s=60.0, left_at=990.0)
+    talk = Talk(standing=Standing(state=State.HOLDING), flight=flight, in_control=False)
+    talk.sees(over="found")
+    talk.pass_by(2.0)
+    assert not [row for row in talk.rows if isinstance(row, TransitionRow)]
+    talk.done()
+    talk.pass_by(2.0)
+    assert (talk.state, talk.core.standing.settled) == (State.HOLDING, True)
+
+
 # ---- where it is
 
 
@@ -415,3 +508,61 @@ def test_the_pilot_is_told_what_to_do_in_ready() -> None:
     talk.tick()
     talk.tick()
     assert Tell("search READY: select Hold") in talk.wanted
+
+
+@pytest.mark.parametrize("landed", ["takeoff", "in_air", "on_ground", "undefined"])
+def test_a_take_off_that_fails_in_the_air_flies_home(landed: str) -> None:
+    talk = prepared(4)
+    talk.shows(armed=True, guided=True)
+    talk.shows(landed_state=landed, alt_home_m=9.0, alt_amsl_m=409.0)
+    assert isinstance(talk.doing(), TakeOff)
+    talk.failed("the take-off to 15 m did not end: it is at 9.0 m")
+    talk.pass_by(3.0)
+    assert (talk.state, talk.doing()) == (State.RETURNING, ReturnToLaunch())
+    assert "did not end" in talk.core.standing.why_stopped
+
+
+def test_a_take_off_that_fails_on_the_ground_stays_there() -> None:
+    talk = prepared(4)
+    talk.shows(armed=True)
+    talk.failed("the vehicle did not take off: it answered DENIED")
+    talk.pass_by(3.0)
+    assert talk.state == State.ABORTED
+    assert ReturnToLaunch() not in talk.wanted
+
+
+def test_a_slow_climb_is_given_its_time() -> None:
+    assert climb_s(70.0, None) == climb_s(70.0, 2.5) == 120.0
+    assert climb_s(100.0, 0.5) > 100.0 / 0.5
+
+
+@pytest.mark.parametrize("state", [State.READY, State.GROUNDED])
+def test_who_takes_off_by_hand_hears_before_what_the_aircraft_lacks(state: State) -> None:
+    lacks = "it does not tell whether it is in the air (EXTENDED_SYS_STATE)"
+    talk = reached(state, **{**ON_GROUND, **LEFT_US}) if state == State.READY else grounded()
+    talk.tick()
+    talk.sees(missing=(lacks,))
+    talk.wanted.clear()
+    talk.pass_by(LACKS_S - 1.0)
+    assert not [each for each in talk.wanted if isinstance(each, Tell) and lacks in each.text]
+    talk.pass_by(20.0)
+    assert len([each for each in talk.wanted if isinstance(each, Tell) and lacks in each.text]) == 1
+    assert lacks in talk.core.standing.why
+
+
+def test_after_a_restart_who_takes_off_by_hand_as_ready_says_gives_the_aircraft_over() -> None:
+    talk = Talk(may_take_off=True, **{**ON_GROUND, **LEFT_US, "mode": "STABILIZE"})
+    talk.core.terms = replace(talk.core.terms, restarted=True)
+    talk.tick()
+    talk.done()
+    talk.pass_by(3.0)
+    assert Tell("search READY: order launch, or take off and select the guided mode") in talk.wanted
+    talk.pilot("LOITER")
+    talk.shows(armed=True, landed_state="in_air", alt_home_m=15.0, alt_amsl_m=415.0)
+    talk.pass_by(2.0)
+    talk.shows(mode="GUIDED", guided=True)
+    talk.on(ModeChanged(talk.now, "GUIDED", "LOITER", ModeKind.GUIDED, True, False, False))
+    talk.pass_by(2.0)
+    assert (talk.state, talk.doing()) == (State.READY, EnterGuided())
+    talk.done()
+    assert talk.state == State.SEARCHING

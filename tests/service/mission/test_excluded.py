@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 import shapely
 
-from service.area import Grid
+from service.area import Grid, build_grid, parse_area
 from service.errors import BadInput
+from service.mavlink.events import Home
 from service.mission.effects import DropThought, SendWaypoint, Stop, Tell, Think
 from service.mission.news import MapChanged, Order
-from service.mission.states import State
-from tests.service.mission.flown import GRID, HERE, Talk, place, reached, searching
+from service.mission.states import Event, State
+from tests.service.mission.flown import GRID, HERE, Talk, place, reached, searching, takes_off
 
 
 def box(west: float, south: float, east: float, north: float) -> shapely.Polygon:
@@ -113,10 +116,26 @@ def test_the_pilot_is_told_when_the_autopilots_own_way_home_may_cross_it() -> No
     assert talk.core.standing.autopilot_returns
     talk.wanted.clear()
     talk.on(MapChanged(GRID.excluding(box(90.0, 10.0, 110.0, 140.0))))
-    assert [e.text for e in talk.wanted if isinstance(e, Tell)] == [
+    assert [e.text for e in talk.wanted if isinstance(e, Tell) and "cut off" not in e.text] == [
         "search RETURNING: the autopilot's way home may cross ground that is excluded now"
     ]
     assert Stop() not in talk.wanted
+
+
+def test_the_energy_for_the_way_home_is_that_of_the_way_around_it_while_the_aircraft_hovers() -> None:
+    talk = reached(State.SEARCHING)
+    talk.pass_by(1.0)
+    talk.flew(place(200.0, 95.0))
+    talk.tick()
+    straight_s = talk.core.reserve.energy.home.seconds
+    talk.on(MapChanged(GRID.excluding(box(105.0, 5.0, 125.0, 130.0))))
+    talk.tick()
+    around_s = talk.core.reserve.energy.home.seconds
+    assert around_s > straight_s + 5.0
+    lat, lon = place(200.0, 90.0)
+    talk.shows(home=Home(lat, lon, 400.0))
+    talk.tick()
+    assert talk.core.reserve.energy.home.seconds < straight_s
 
 
 def test_taken_back_it_may_be_flown_over_again() -> None:
@@ -144,3 +163,81 @@ def test_an_exclusion_keeps_its_mass_and_only_its_ground_is_not_flown_over() -> 
 def test_an_exclusion_that_leaves_no_way_is_refused(corners: Any, words: str) -> None:
     with pytest.raises(BadInput, match=words):
         GRID.excluding(box(*corners))
+
+
+def texts(talk: Talk) -> list[str]:
+    """What the pilot was told so far."""
+    return [effect.text for effect in talk.wanted if isinstance(effect, Tell)]
+
+
+@pytest.mark.parametrize(
+    ("state", "settings"), [(State.HOLDING, None), (State.FOUND, {"search": {"on_found": "hover"}})]
+)
+def test_who_hovers_over_it_is_told_to_people(state: State, settings: Any) -> None:
+    talk = reached(state, settings)
+    talk.wanted.clear()
+    talk.on(MapChanged(GRID.excluding(box(20.0, 20.0, 60.0, 60.0))))
+    assert texts(talk) == []
+    talk.on(MapChanged(GRID.excluding(box(180.0, 30.0, 220.0, 70.0))))
+    assert texts(talk) == [f"search {state}: it hovers over ground that is excluded now"]
+    assert "it hovers over ground that is excluded now" in talk.core.standing.why
+
+
+def test_what_is_cut_off_is_told_to_the_pilot_once() -> None:
+    talk = under_way()
+    grid = GRID.excluding(box(90.0, 10.0, 110.0, 140.0))
+    (note,) = grid.layout_notes[len(GRID.layout_notes) :]
+    talk.on(MapChanged(grid))
+    talk.on(MapChanged(replace(grid)))
+    assert [each for each in texts(talk) if "cut off" in each] == [f"search SEARCHING: {note}"]
+
+
+def test_told_on_the_ground_between_two_sorties_the_next_one_keeps_clear_of_it() -> None:
+    talk = reached(State.GROUNDED)
+    talk.on(MapChanged(wall()))
+    assert talk.state == State.GROUNDED
+    talk.happens(Event.AIRBORNE)
+    talk.wanted.clear()
+    talk.pass_by(2.0)
+    talk.done()
+    talk.pass_by(2.0)
+    assert not talk.core.chart.leg_allowed(HERE, place(200.0, 120.0))
+    assert not [each for each in sent(talk) if not talk.core.chart.leg_allowed(HERE, each.point)]
+
+
+def test_told_while_it_takes_off_over_it_the_aircraft_leaves_by_the_nearest_way() -> None:
+    talk = reached(State.TAKEOFF)
+    talk.on(MapChanged(GRID.excluding(box(180.0, 30.0, 220.0, 70.0))))
+    assert talk.state == State.TAKEOFF
+    talk.tick()
+    takes_off(talk)
+    talk.flew()
+    talk.tick()
+    assert talk.state == State.SEARCHING
+    talk.wanted.clear()
+    talk.pass_by(1.0)
+    talk.done()
+    talk.pass_by(4.0)
+    (first, *_) = sent(talk)
+    assert first.on_way
+    assert not talk.core.chart.too_near(first.point)
+
+
+SQUARE = [(0.0, 0.0), (0.001, 0.0), (0.001, 0.001), (0.0, 0.001), (0.0, 0.0)]
+
+
+def test_two_parts_whose_transit_is_cut_are_not_both_flown() -> None:
+    """The ground between them is crossed, and not searched: what closes it gives one of them up."""
+    rings = [[[8.3 + lon + by, 47.05 + lat] for lon, lat in SQUARE] for by in (0.0, 0.002)]
+    feature = {
+        "type": "Feature",
+        "properties": {},
+        "geometry": {"type": "MultiPolygon", "coordinates": [[r] for r in rings]},
+    }
+    area = {"type": "FeatureCollection", "features": [feature]}
+    grid = build_grid(parse_area(json.dumps(area).encode(), source="parts"), 10.0)
+    assert grid.flyable[grid.searchable].all()
+    across = shapely.box(8.3014, 47.0495, 8.3016, 47.0515)
+    cut = grid.excluding(across)
+    assert 0.45 < float(cut.prior[cut.flyable].sum()) < 0.55
+    assert cut.cut_off

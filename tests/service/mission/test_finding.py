@@ -10,11 +10,11 @@ import pytest
 from service.chances import sure
 from service.mavlink.texts import text_messages
 from service.mission.effects import Answer, EnterGuided, Stop, Tell, WriteRow
-from service.mission.news import Judged, Order
-from service.mission.states import State
+from service.mission.news import Judged, MapChanged, Order
+from service.mission.states import Event, State
 from service.places import Coordinates, written
-from service.rows import FoundRow
-from tests.service.mission.flown import FOUND, GRID, LEFT_US, Talk, reached, searching
+from service.rows import FoundRow, TransitionRow
+from tests.service.mission.flown import FOUND, GRID, LEFT_US, ON_GROUND, Talk, reached, searching
 
 
 def over(on_found: str, coordinates: Coordinates = "degrees") -> Talk:
@@ -191,3 +191,46 @@ def test_one_of_several_whose_detector_is_silent_comes_home_when_the_search_is_o
     talk.sees(over="found")
     talk.tick()
     assert (talk.state, talk.core.standing.why_stopped) == (State.RETURNING, "found")
+
+
+def searched_enough() -> Talk:
+    """A search that has ended by what others said to have searched, and is on its way home."""
+    talk = searching(WAITS)
+    talk.sees(searched=0.99, enough=0.95)
+    talk.on(MapChanged(GRID))
+    talk.tick()
+    assert (talk.state, talk.core.standing.settled) == (State.RETURNING, True)
+    talk.wanted.clear()
+    return talk
+
+
+WAITS = {"run": {"next_sortie_within_s": 3600.0}}
+
+
+def test_news_that_ended_the_search_and_are_taken_back_on_the_way_home_leave_another_sortie() -> None:
+    talk = searched_enough()
+    talk.sees(searched=0.3)
+    talk.on(MapChanged(GRID))
+    assert not talk.core.standing.settled
+    (row,) = [each for each in talk.rows if isinstance(each, TransitionRow)]
+    assert (row.before, row.event, row.after) == (State.RETURNING, Event.RESUME, State.RETURNING)
+    assert any("the search is not over" in each.text for each in talk.wanted if isinstance(each, Tell))
+    talk.shows(**ON_GROUND, in_control=False)
+    talk.pass_by(1.0)
+    assert talk.state == State.GROUNDED
+
+
+@pytest.mark.parametrize("more", [{}, {"searched": 0.96}])
+def test_news_that_leave_enough_searched_change_nothing(more: dict[str, float]) -> None:
+    talk = searched_enough()
+    talk.sees(**more)
+    talk.on(MapChanged(GRID))
+    assert talk.core.standing.settled
+
+
+def test_what_an_operator_has_finished_stays_so_whatever_news_come() -> None:
+    talk = searched_enough()
+    talk.on(Order("finish"))
+    talk.sees(searched=0.3)
+    talk.on(MapChanged(GRID))
+    assert talk.core.standing.settled

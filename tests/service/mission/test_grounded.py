@@ -48,6 +48,21 @@ def said(talk: Talk) -> list[str]:
     return [effect.text for effect in talk.wanted if isinstance(effect, Tell)]
 
 
+@pytest.mark.parametrize("coming", [False, True])
+def test_what_others_have_searched_enough_meanwhile_needs_no_sortie(coming: bool) -> None:
+    talk = grounded()
+    if coming:
+        talk.on(Order("replace"))
+    talk.sees(searched=0.98, enough=0.95)
+    talk.pass_by(1.0)
+    standing = talk.core.standing
+    assert (talk.state, standing.searched, standing.why_stopped) == (
+        State.DONE,
+        True,
+        "searched to POS 98.0 %",
+    )
+
+
 def test_a_landing_before_the_search_is_over_waits_and_moves_nothing() -> None:
     talk = grounded()
     talk.pass_by(60.0)
@@ -435,3 +450,9 @@ def test_what_a_sortie_leaves_is_planned_from_the_launch_point_before_the_next()
     over.on(Order("finish"))
     assert over.state == State.DONE
     assert PlanAnew() not in over.wanted
+
+
+def test_it_waits_between_two_sorties_after_a_restart_too() -> None:
+    assert grounded().core.between_sorties
+    assert Talk(standing=Standing(state=State.GROUNDED)).core.between_sorties
+    assert not Talk(standing=Standing(state=State.SEARCHING)).core.between_sorties

@@ -9,10 +9,10 @@ import pytest
 from service.mavlink.events import LinkLost, Stalled, Target, TargetNotTaken
 from service.mavlink.telemetry import Home
 from service.mission.effects import Land, ReturnToLaunch, Stop
-from service.mission.news import NotStopped, Order
+from service.mission.news import Judged, NotStopped, Order
 from service.mission.states import State
 from sim.soak import ground
-from tests.service.mission.flown import Talk, reached, searching
+from tests.service.mission.flown import FOUND, Talk, reached, searching
 
 
 def silenced(after_silence: str = "resume") -> Talk:
@@ -189,3 +189,33 @@ def test_a_stop_is_not_tried_again_and_again_while_nobody_is_heard() -> None:
     talk.pass_by(3.0)
     assert (talk.state, talk.core.standing.causes) == (State.HOLDING, {"operator"})
     assert talk.wanted.count(Stop()) == 1
+
+
+@pytest.mark.parametrize("rejected", [False, True])
+def test_after_a_silence_over_what_was_found_it_hovers_over_that_again(rejected: bool) -> None:
+    talk = searching({"search": {"on_found": "hover"}})
+    talk.sees(found=FOUND)
+    talk.tick()
+    assert talk.state == State.FOUND
+    talk.silent.add("heartbeat")
+    talk.tick(4.0)
+    talk.on(LinkLost(talk.now, 4.0))
+    assert talk.state == State.HOLDING
+    if rejected:
+        talk.sees(found=None)
+        talk.on(Judged(False, None))
+    talk.silent.clear()
+    talk.pass_by(5.0)
+    assert talk.state == (State.SEARCHING if rejected else State.FOUND)
+
+
+def test_a_find_that_the_search_went_on_after_is_not_hovered_over_after_a_hold() -> None:
+    talk = searching({"search": {"on_found": "continue"}})
+    talk.sees(found=FOUND)
+    talk.tick()
+    talk.silent.add("detector")
+    talk.pass_by(11.0)
+    assert (talk.state, talk.core.standing.found) == (State.HOLDING, FOUND)
+    talk.silent.clear()
+    talk.tick()
+    assert talk.state == State.SEARCHING

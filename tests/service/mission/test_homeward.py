@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import pytest
+
 from service.mavlink.events import Stalled
-from service.mission.effects import EnterGuided, ReturnToLaunch, SendWaypoint
-from service.mission.homeward import HOME_AGAIN_S
-from service.mission.news import Done, Order
+from service.mission.effects import EnterGuided, Land, ReturnToLaunch, SendWaypoint, Tell
+from service.mission.homeward import HOME_AGAIN_S, KEPT_S, LANDS_AFTER
+from service.mission.limits import Objection
+from service.mission.news import Done, NotSent, Order
 from service.mission.states import State
 from tests.service.mission.flown import ON_GROUND, Talk, place, reached
 
@@ -43,6 +48,117 @@ def test_no_waypoint_of_ours_is_watched_while_the_autopilot_lands() -> None:
     talk.shows(guided=False)
     talk.pass_by(60.0)
     assert talk.state == State.RETURNING
+
+
+def kept(talk: Talk, cause: str, seconds: int) -> None:
+    """Time passes in which each waypoint is refused for a cause."""
+    for _ in range(seconds):
+        talk.tick(1.0)
+        if isinstance(waypoint := talk.core.doing, SendWaypoint):
+            talk.on(NotSent(waypoint, Objection(cause, "for a test")))
+
+
+def behind(full_battery_s: float = 1200.0) -> Talk:
+    """An aircraft that has to fly around an exclusion on its way home."""
+    talk = reached(State.SEARCHING, {"flight": {"altitude_m": 15.0, "full_battery_s": full_battery_s}})
+    talk.shows(lat=BEHIND[0], lon=BEHIND[1])
+    talk.flew()
+    talk.on(Order("return"))
+    talk.tick()
+    assert isinstance(talk.doing(), SendWaypoint)
+    return talk
+
+
+def test_a_way_home_whose_waypoints_are_refused_becomes_the_autopilots_own() -> None:
+    """Whatever the link has against them: a control that is doubtful, another's target that is suspected."""
+    talk = behind()
+    kept(talk, "link", int(KEPT_S) + 3)
+    assert talk.doing() == ReturnToLaunch()
+    talk.done()
+    talk.shows(guided=False)
+    talk.pass_by(30.0)
+    said = [each.text for each in talk.wanted if isinstance(each, Tell) and "by itself" in each.text]
+    assert (len(said), talk.state) == (1, State.RETURNING)
+
+
+def test_a_point_that_is_refused_for_a_moment_does_not_end_our_own_way() -> None:
+    talk = behind()
+    for _ in range(4):
+        kept(talk, "link", int(KEPT_S) - 2)
+        talk.pass_by(1.5)
+        talk.done()
+        talk.on(Stalled(talk.now, 3.0))
+        talk.pass_by(1.5)
+        assert isinstance(talk.doing(), SendWaypoint)
+
+
+def test_the_others_are_waited_for_on_the_way_home_until_the_energy_or_the_patience_is_spent() -> None:
+    for battery, ends in ((60.0, False), (9.0, True)):
+        talk = behind()
+        kept(talk, "apart", 30)
+        talk.shows(battery_percent=battery)
+        kept(talk, "apart", 30)
+        assert isinstance(talk.core.doing, ReturnToLaunch) == ends
+    talk = behind(full_battery_s=7200.0)
+    kept(talk, "apart", 910)
+    assert talk.doing() == ReturnToLaunch()
+
+
+def test_a_low_battery_alone_does_not_end_our_own_way_around_what_is_excluded() -> None:
+    talk = behind()
+    talk.done()
+    talk.shows(battery_percent=9.0)
+    talk.pass_by(10.0)
+    assert talk.core.doing is None
+
+
+@pytest.mark.parametrize("cause", ["limits", "ground"])
+def test_a_way_home_that_is_refused_for_where_it_leads_holds_and_goes_by_itself_when_its_energy_is_low(
+    cause: str,
+) -> None:
+    talk = behind()
+    kept(talk, cause, 30)
+    assert talk.state == State.HOLDING
+    talk.shows(battery_percent=18.0)
+    kept(talk, cause, 3)
+    assert (talk.state, talk.doing()) == (State.RETURNING, ReturnToLaunch())
+
+
+@pytest.mark.parametrize("mode", [{"guided": True}, {"guided": False, "mode": "BRAKE"}])
+def test_a_return_that_is_refused_is_ordered_again_in_any_mode_and_lands_in_the_end(
+    mode: dict[str, Any],
+) -> None:
+    talk = homebound()
+    talk.shows(**mode)
+    for _ in range(LANDS_AFTER):
+        assert talk.doing() == ReturnToLaunch()
+        talk.failed("it answered FAILED")
+        talk.pass_by(HOME_AGAIN_S - 1.0)
+        assert talk.core.doing is None
+        talk.pass_by(2.0)
+    assert talk.doing() == Land()
+    talk.failed("it did not answer")
+    talk.pass_by(HOME_AGAIN_S + 1.0)
+    assert talk.doing() == Land()
+
+
+def test_a_return_that_fails_as_nobody_hears_it_does_not_become_a_landing() -> None:
+    talk = homebound()
+    talk.silent.add("heartbeat")
+    for _ in range(2 * LANDS_AFTER):
+        talk.pass_by(HOME_AGAIN_S + 2.0)
+        assert talk.doing() == ReturnToLaunch()
+        talk.failed("the vehicle has not been heard")
+
+
+def test_a_return_that_an_order_broke_off_in_vain_is_ordered_again() -> None:
+    talk = homebound()
+    talk.shows(guided=False, mode="BRAKE")
+    talk.on(Order("hold"))
+    talk.failed("it did not answer")
+    assert talk.state == State.RETURNING
+    talk.pass_by(HOME_AGAIN_S + 1.0)
+    assert talk.doing() == ReturnToLaunch()
 
 
 def test_a_return_to_launch_that_is_not_flown_is_ordered_again_and_one_that_is_flown_is_not() -> None:

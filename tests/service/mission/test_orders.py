@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from service.mission.effects import Answer, DropAction, EnterGuided, Stop, Tell
+from service.mission.effects import ACTIONS, Answer, DropAction, Effect, EnterGuided, Stop, Tell
 from service.mission.news import Order
 from service.mission.orders import ASKED, OFFERED, SIGNAL
 from service.mission.states import TABLE, Event, State
 from service.rows import TransitionRow
-from tests.service.mission.flown import LEFT_US, ON_GROUND, reached
+from tests.service.mission.flown import LEFT_US, ON_GROUND, Talk, reached
 
 SO_ALREADY = {
     (State.HOLDING, "hold"),
@@ -35,6 +35,7 @@ def test_an_order_does_what_the_table_says_and_is_answered(state: State, command
     assert talk.state == TABLE.get((state, COMMANDS[command]), state)
     (answer,) = [each for each in did if isinstance(each, Answer)]
     obeyed = (state, COMMANDS[command]) in TABLE or (state, command) in SO_ALREADY
+    obeyed |= state == State.WAITING and command in ("hold", "return")  # once it is heard
     assert answer == Answer(7, "" if obeyed else f"there is nothing to {command} in {state}")
 
 
@@ -93,16 +94,39 @@ def test_why_a_run_stopped_is_who_ordered_it() -> None:
     assert talk.core.standing.why_stopped == "the operator aborted the run"
 
 
-def test_resume_does_not_take_the_aircraft_from_a_hand_on_the_sticks() -> None:
-    talk = reached(State.YIELDED)
-    talk.shows(sticks=0.4)
-    (answer,) = [each for each in talk.on(Order("resume", 7)) if isinstance(each, Answer)]
-    assert "sticks" in answer.refused
-    assert (talk.state, talk.core.doing) == (State.YIELDED, None)
-    assert any(isinstance(each, Tell) and "sticks" in each.text for each in talk.wanted)
-    talk.shows(sticks=0.02)
-    talk.on(Order("resume", 8))
-    assert talk.doing() == EnterGuided()
+@pytest.mark.parametrize("command", [*OFFERED, "abort", "leave"])
+@pytest.mark.parametrize("changes", [{}, ON_GROUND], ids=["in the air", "on the ground"])
+def test_no_order_takes_the_aircraft_from_a_hand_on_the_sticks(changes: dict[str, Any], command: str) -> None:
+    talk = yielded(changes, 0.4)
+    did = talk.on(Order(command, 7))
+    refused = next((each.refused for each in did if isinstance(each, Answer)), "")
+    assert not takes(did)
+    if takes(yielded(changes, 0.02).on(Order(command, 8))):  # which is what the sticks are against
+        assert "sticks" in refused
+        assert talk.state in (State.YIELDED, State.DONE)  # landed, as it is on the ground
+        assert any(isinstance(each, Tell) and "sticks" in each.text for each in did)
+
+
+def takes(did: list[Effect]) -> bool:
+    """Whether what follows from an order takes the aircraft, or begins to."""
+    return any(isinstance(each, ACTIONS) for each in did)
+
+
+def yielded(changes: dict[str, Any], sticks: float) -> Talk:
+    """An aircraft that its pilot has, in the air or on the ground, with a hand on the sticks or none."""
+    talk = reached(State.YIELDED, may_take_off=True)
+    talk.shows(sticks=sticks, **changes)
+    return talk
+
+
+def test_the_orders_that_take_a_yielded_aircraft_are_known() -> None:
+    """Without a hand on the sticks, each of these does; so the test above is about something."""
+    taking = set()
+    for changes in ({}, ON_GROUND):
+        for command in (*OFFERED, "abort", "leave"):
+            if takes(yielded(changes, 0.02).on(Order(command, 7))):
+                taking.add(command)
+    assert taking == {"resume", "return", "launch"}
 
 
 def test_a_hold_in_the_climb_stops_it() -> None:

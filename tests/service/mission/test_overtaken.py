@@ -9,11 +9,11 @@ import pytest
 
 from service.mavlink import NotPermitted
 from service.mavlink.events import Rebooted
-from service.mission.effects import Answer, Arm, DropAction, EnterGuided, Rest, Tell, WaitReady
-from service.mission.news import Order
+from service.mission.effects import Answer, Arm, DropAction, EnterGuided, Rest, SetSpeed, Tell, WaitReady
+from service.mission.news import Judged, Order
 from service.mission.states import State
 from tests.service.mission.aloft import aloft, until
-from tests.service.mission.flown import LEFT_US, ON_GROUND, Talk, reached
+from tests.service.mission.flown import FOUND, LEFT_US, ON_GROUND, Talk, reached, searching
 from tests.service.mission.test_grounded import grounded
 from tests.service.mission.test_mission import locked
 
@@ -113,6 +113,8 @@ def test_a_mode_that_the_pilot_selected_is_not_left_without_an_order(flavor: str
             mode = vehicle.telemetry.mode
             with pytest.raises(NotPermitted, match="its pilot has selected R"):
                 await vehicle.enter_guided(there=True)
+            with pytest.raises(NotPermitted, match="its pilot has selected R"):
+                await vehicle.enter_guided(out_of="BRAKE")
             await mission.clock.sleep(3.0)
             assert vehicle.telemetry.mode == mode
 
@@ -137,3 +139,71 @@ def test_a_hold_is_not_undone_by_a_resume_that_was_ordered_before_it_and_waits_f
             await until(mission, lambda: mission.state == State.SEARCHING)
 
     asyncio.run(fly())
+
+
+@pytest.mark.parametrize("state", [State.HOLDING, State.FOUND, State.RETURNING, State.YIELDED])
+@pytest.mark.parametrize("confirmed", [True, False])
+def test_a_word_on_a_place_moves_nothing_once_a_person_has_stopped_the_aircraft_since(
+    confirmed: bool, state: State
+) -> None:
+    talk = reached(state, {"search": {"on_found": "hover"}})
+    talk.sees(confirmed=confirmed, found=FOUND if confirmed else None)
+    did = talk.on(Judged(confirmed, FOUND if confirmed else None, 7, moves=False))
+    assert Answer(7) in did
+    assert (talk.state, talk.core.doing) == (state, None)
+    assert [each for each in did if isinstance(each, Tell) and "stays stopped" in each.text]
+
+
+def test_a_place_that_was_confirmed_while_the_aircraft_was_stopped_ends_the_search_that_goes_on() -> None:
+    talk = searching()
+    talk.on(Order("hold"))
+    talk.sees(confirmed=True, found=FOUND)
+    talk.on(Judged(True, FOUND, 7, moves=False))
+    talk.on(Order("resume"))
+    for _ in range(4):
+        talk.tick()
+        if isinstance(talk.core.doing, SetSpeed):
+            talk.done()
+    assert (talk.state, talk.core.standing.found) == (State.RETURNING, FOUND)
+
+
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize("word", ["confirm", "reject"])
+def test_a_hold_is_not_undone_by_a_word_on_a_place_that_was_given_before_it_and_waits_for_the_disk(
+    word: str, tmp_path: Path
+) -> None:
+    async def fly() -> None:
+        async with aloft(tmp_path) as mission:
+            place = mission.core.chart.latlon(mission.cell())
+            with locked(mission.journal.path):
+                judging = asyncio.create_task(mission.order(word, place))
+                await asyncio.sleep(0.2)
+                await mission.order("hold")
+            receipt = await asyncio.wait_for(judging, 10.0)
+            assert receipt.refused is None
+            await mission.clock.sleep(3.0)
+            assert mission.state == State.HOLDING
+
+    asyncio.run(fly())
+
+
+def test_what_no_person_orders_just_now_leaves_no_mode_but_the_one_that_was_seen() -> None:
+    """The mode that a pilot selects may be read in the very moment in which ours is to be sent."""
+    talk = searching()
+    talk.shows(fix=1)
+    talk.tick()
+    talk.shows(guided=False, mode="BRAKE", fix=3)
+    talk.pass_by(10.0)
+    braked = talk.doing()
+    assert isinstance(braked, EnterGuided)
+    assert braked.out_of == "BRAKE"
+    talk = reached(State.TAKEOFF, mode="STABILIZE", guided=False)
+    talk.tick()
+    first = talk.doing()
+    assert isinstance(first, EnterGuided)
+    assert first.out_of == "STABILIZE"
+    talk = reached(State.YIELDED)
+    talk.on(Order("resume", 7))
+    ordered = talk.doing()
+    assert isinstance(ordered, EnterGuided)
+    assert (ordered.there, ordered.out_of) == (False, None)

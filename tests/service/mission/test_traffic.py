@@ -9,14 +9,16 @@ from typing import Any
 import pytest
 
 from service.mavlink.events import Target
+from service.mavlink.telemetry import Telemetry
 from service.mission.apart import SETTLES_S, Claim, Other, Room, Spacing, home_by_s, objection
 from service.mission.core import MissionCore
 from service.mission.effects import Arm, EnterGuided, Note, ReturnToLaunch, SendWaypoint, Stop
+from service.mission.flight import Flight
 from service.mission.news import NotSent, Order
-from service.mission.standing import Terms
+from service.mission.standing import Standing, Terms
 from service.mission.states import State
 from sim.soak import ground
-from tests.service.mission.flown import GRID, HERE, ON_GROUND, Talk, place, reached, searching
+from tests.service.mission.flown import GRID, HERE, ON_GROUND, START, Talk, place, reached, searching
 
 HOME = ground.launch()
 FAR = place(20.0, 190.0)
@@ -216,6 +218,30 @@ def test_among_others_the_way_home_is_flown_in_the_own_layer_and_the_landing_wai
     assert talk.core.told(talk.seen, talk.now).returns
 
 
+def test_who_lands_already_makes_no_room_for_one_that_waits_to_land_after_it() -> None:
+    """What it would be sent to its autopilot does not fly to any more, and down there it would never be over."""
+    talk = named(searching())
+    talk.sees(others=(other(FAR),))
+    talk.on(Order("return"))
+    talk.tick()
+    while isinstance(talk.core.doing, SendWaypoint):
+        point = talk.core.doing.point
+        assert sent(talk)
+        talk.flew(point)
+        talk.tick()
+    assert isinstance(talk.doing(), ReturnToLaunch)
+    talk.done()
+    talk.shows(guided=False, mode="RTL")
+    waits = Claim(Room((HOME,), -math.inf, 60.0), True, "land")
+    talk.sees(others=(other(place(60.0, 20.0), up=60.0, claim=waits),))
+    talk.wanted.clear()
+    talk.pass_by(20.0)
+    assert not any(isinstance(effect, SendWaypoint) for effect in talk.wanted)
+    talk.shows(**ON_GROUND)
+    talk.tick()
+    assert talk.state == State.DONE
+
+
 def test_the_wait_for_those_who_land_before_is_in_the_battery() -> None:
     """Two others over the same launch point, 30 and 40 m up: each takes its descent and a while to stand still."""
 
@@ -392,6 +418,80 @@ def test_who_is_not_heard_or_is_flown_by_its_pilot_is_not_steered_and_its_place_
     told = other_one.core.told(other_one.seen, other_one.now)
     assert told.in_air
     assert not told.steered
+
+
+@pytest.mark.parametrize(
+    ("east_m", "link", "said"), [(1.0, "udpin://:14550", 1), (6.0, "udpin://:14550", 0), (1.0, None, 0)]
+)
+def test_who_lands_where_another_one_lands_is_told_before_the_take_off(
+    east_m: float, link: str | None, said: int
+) -> None:
+    talk = named(
+        reached(State.READY, {"link": {"connect": link} if link else {}}, may_take_off=True, **ON_GROUND)
+    )
+    talk.tick()
+    lat, lon = HOME
+    parked = other(HERE, system_id=2, in_air=False, home=(lat, lon + east_m / 76_000.0))
+    talk.sees(others=(parked,))
+    talk.done()
+    talk.pass_by(2.0)
+    assert isinstance(talk.doing(), EnterGuided)
+    assert notes(talk, "may come down on who stands there") == said
+    assert ("from that of aircraft 1" in talk.core.standing.why) == bool(said)
+
+
+SPACING = Spacing.of(Talk().settings.flight, 2.0)
+LAST = place(180.0, 120.0)
+
+
+def left_behind(left: State, *, earlier_s: float = 0.0, seconds_ago: float = 10.0) -> Talk:
+    """A mission whose aircraft an earlier process flew, so long ago, and that has not been heard yet."""
+    flight = Flight(flown=True, carried_s=90.0, earlier_s=earlier_s, left_at=START - seconds_ago)
+    flight.track.append((START - seconds_ago, *LAST, 15.0))
+    flight.goal, flight.told_at = FAR, START - seconds_ago
+    talk = Talk(standing=Standing(state=left), flight=flight)
+    talk.sees(telemetry=Telemetry())
+    return talk
+
+
+@pytest.mark.parametrize(
+    "left", [State.SEARCHING, State.HOLDING, State.YIELDED, State.RETURNING, State.TAKEOFF]
+)
+def test_one_that_was_left_in_the_air_and_is_not_heard_yet_may_be_on_its_way_home(left: State) -> None:
+    talk = left_behind(left)
+    told = talk.core.told(talk.seen, talk.now)
+    assert (told.in_air, told.steered, told.place, told.up_m, told.age_s) == (True, False, LAST, 15.0, 10.0)
+    below = other(HOME, up=0.0, name="3")
+    through_its_way_home = below.sent(HOME, 15.0)
+    assert "not been heard for 10 s" in objection(below, through_its_way_home, (told,), SPACING)
+    later = talk.core.told(talk.seen, talk.now + SPACING.battery_s)
+    assert not objection(below, through_its_way_home, (later,), SPACING)
+
+
+def test_what_is_ordered_before_it_is_heard_does_not_take_it_from_the_air() -> None:
+    talk = left_behind(
+        State.TAKEOFF, earlier_s=90.0
+    )  # of a first flight; nothing is journalled of this one yet
+    talk.on(Order("hold"))
+    told = talk.core.told(talk.seen, talk.now)
+    assert told.in_air
+    assert 15.0 in told.goals_up_m
+
+
+def test_until_it_is_heard_it_may_fly_to_where_it_was_sent_last() -> None:
+    talk = left_behind(State.SEARCHING)
+    assert talk.core.told(talk.seen, talk.now).goals == (FAR,)
+    talk.sees(telemetry=searching().seen.telemetry)
+    heard = talk.core.told(talk.seen, talk.now)
+    assert (heard.place, heard.goals) == (HERE, ())
+
+
+@pytest.mark.parametrize(
+    ("left", "earlier_s"), [(State.GROUNDED, 90.0), (State.WAITING, 0.0), (State.HOLDING, 90.0)]
+)
+def test_one_that_was_left_on_the_ground_takes_no_room(left: State, earlier_s: float) -> None:
+    talk = left_behind(left, earlier_s=earlier_s)
+    assert not talk.core.told(talk.seen, talk.now).in_air
 
 
 def test_the_name_comes_with_the_terms() -> None:

@@ -26,9 +26,18 @@ from service.mavlink.events import (
     VehicleEvent,
 )
 from service.mavlink.modes import ModeKind
-from service.mission.effects import LetGo, SendWaypoint, Stop, Tell, WriteRow
+from service.mission.effects import (
+    Brake,
+    EnterGuided,
+    LetGo,
+    ReturnToLaunch,
+    SendWaypoint,
+    Stop,
+    Tell,
+    WriteRow,
+)
 from service.mission.states import MAY_MOVE, State
-from service.mission.watch import LISTENERS
+from service.mission.watch import LISTENERS, REFUSALS
 from service.rows import ModeRow, VehicleClockRow, YieldedRow
 from tests.service.mission.flown import GRID, ON_GROUND, Talk, reached, searching
 
@@ -146,6 +155,12 @@ def test_whoever_else_sends_the_aircraft_somewhere_gets_it(state: State) -> None
     assert not [effect for effect in talk.pass_by(60.0) if isinstance(effect, (Stop, SendWaypoint))]
 
 
+def test_who_commands_the_aircraft_without_a_target_that_is_known_gets_it() -> None:
+    talk = searching()
+    talk.on(replace(replaced(talk.now), found=None))
+    assert (talk.state, talk.core.standing.why) == (State.YIELDED, "a ground station commands the aircraft")
+
+
 def test_a_yield_always_says_how_to_give_the_aircraft_back() -> None:
     talk = searching()
     (told,) = [effect.text for effect in talk.pilot() if isinstance(effect, Tell)]
@@ -155,6 +170,16 @@ def test_a_yield_always_says_how_to_give_the_aircraft_back() -> None:
     did = talk.on(ModeChanged(talk.now, "GUIDED", "LOITER", ModeKind.GUIDED, True, False, False))
     assert Tell("search YIELDED: in Hold again; Resume gives it back", 5) in did
     assert talk.state == State.YIELDED
+
+
+@pytest.mark.parametrize(
+    ("may_take_off", "how"), [(True, "Launch gives it back"), (False, "take off, then Resume gives it back")]
+)
+def test_a_yield_on_the_ground_says_what_is_not_refused_there(may_take_off: bool, how: str) -> None:
+    talk = reached(State.HOLDING, may_take_off=may_take_off)
+    talk.shows(**ON_GROUND)
+    (told, *_) = [effect.text for effect in talk.pilot("STABILIZE") if isinstance(effect, Tell)]
+    assert told.endswith(how)
 
 
 def test_a_hold_that_another_restart_or_landing_finds_on_the_ground_is_not_over() -> None:
@@ -217,3 +242,30 @@ def test_the_vehicles_clock_is_journalled_when_it_is_known_and_when_it_steps() -
     assert pass_by(20.0, 900.0) == []
     (stepped,) = pass_by(20.0, 940.0)  # it has booted again
     assert (stepped.service - stepped.boot_s, stepped.step_s) == (940.0, 40.0)
+
+
+@pytest.mark.parametrize("flies", [True, False])
+@pytest.mark.parametrize("event", ["silence", "moved", "not taken"])
+def test_a_return_that_the_autopilot_flies_by_our_order_is_not_broken_off(event: str, flies: bool) -> None:
+    """It needs neither us nor our waypoints, and a link that comes back does not want it stopped either."""
+    talk = reached(State.RETURNING)
+    talk.tick()
+    assert talk.doing() == ReturnToLaunch()
+    if flies:
+        talk.done()
+        talk.shows(guided=False, mode="RTL")
+    talk.wanted.clear()
+    if event == "silence":
+        talk.silent.add("heartbeat")
+        talk.tick(4.0)
+        talk.on(LinkLost(talk.now, 4.0))
+        talk.silent.clear()
+    elif event == "moved":
+        moved = Home(47.0, 8.301, 400.0)
+        talk.on(ReferenceMoved(talk.now, "origin", Home(47.0, 8.3, 400.0), moved, position_too=True))
+    else:
+        for _ in range(REFUSALS):
+            talk.on(TargetNotTaken(talk.now, Target(47.0, 8.3, 415.0), 5, "no"))
+    talk.pass_by(3.0)
+    assert talk.state == State.RETURNING
+    assert not [each for each in talk.wanted if isinstance(each, Stop | Brake | EnterGuided)]

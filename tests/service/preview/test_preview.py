@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import html5lib
@@ -141,6 +142,13 @@ def test_whatever_the_legend_names_is_in_the_picture(field: tuple[SearchArea, Gr
         assert max(lines["all that can be found"].get_ydata()) < 99.0
 
 
+def test_of_several_aircraft_it_says_that_it_is_of_one(field: tuple[SearchArea, Grid]) -> None:
+    seen = preview(*field, SETTINGS, None, lambda name, part: None)
+    three = Settings.model_validate({"aircraft": [{"name": name} for name in ("a", "b", "c")]}).aircraft
+    words = dict(facts(replace(seen, settings=SETTINGS.model_copy(update={"aircraft": three}))))
+    assert words["aircraft"].startswith("what one of 3 aircraft does")
+
+
 def test_a_battery_that_is_too_small_is_refused(field: tuple[SearchArea, Grid]) -> None:
     with pytest.raises(BadInput, match="2 minutes is too small"):
         preview(*field, SETTINGS, 2.0, lambda name, part: None)
@@ -154,6 +162,7 @@ def test_the_command_prints_it_and_draws_it(tmp_path: Path, capsys: pytest.Captu
     said = capsys.readouterr()
     assert "POS 50%" in said.out
     assert "flight.max_flight_s; no --battery given" in said.out
+    assert "aircraft, by the settings of all" not in said.out
     assert "compiling" in said.err
     text = out.read_text(encoding="utf-8")
     page = html5lib.HTMLParser(strict=True, namespaceHTMLElements=False).parse(text)

@@ -8,13 +8,18 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from service.area import parse_area
+from service.config import Settings
 from service.errors import BadInput
 from service.evidence.sensors import make_sensor
 from service.journal import read_rows
+from service.known import Withdrawn
 from service.news.request import NewsRequest
+from service.resume import retrace_all
+from service.search import Search
 from service.squad import Squad
 from service.view.live import RunView
 from sim.soak import ground
@@ -84,3 +89,26 @@ def test_an_id_that_comes_again_with_other_news_or_after_they_were_taken_back_is
             await view.withdraw("team-3")
 
     assert told(tmp_path, ask) == 1
+
+
+def test_an_exclusion_outlives_the_process_and_can_be_taken_back_after_it(tmp_path: Path) -> None:
+    flyable: list[Any] = []
+
+    async def ask(view: RunView) -> None:
+        corners = [
+            place(*at) for at in ((90.0, 10.0), (110.0, 10.0), (110.0, 140.0), (90.0, 140.0), (90.0, 10.0))
+        ]
+        ground = {"type": "Polygon", "coordinates": [[[lon, lat] for lat, lon in corners]]}
+        feature = {"type": "Feature", "geometry": ground, "properties": {"role": "exclude"}}
+        heard = await view.hear(NewsRequest.model_validate(feature))
+        assert heard["notes"] == list(view.search.grid.layout_notes[len(GRID.layout_notes) :])
+        assert "cut off" in heard["notes"][0]
+        flyable.append(view.search.grid.flyable)
+
+    assert told(tmp_path, ask) == 1
+    after = Search(GRID, Settings())
+    retrace_all(tmp_path / "journal.sqlite", after)
+    assert np.array_equal(after.grid.flyable, flyable[0])
+    assert not np.array_equal(after.grid.flyable, GRID.flyable)
+    after.take(Withdrawn("news-1"))
+    assert np.array_equal(after.grid.flyable, GRID.flyable)

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from service.area.document import name_in
 from service.config import Settings
 from service.mission.states import State
 from service.reasons import Option
 from service.search import Search
 from service.survey import survey
-from service.view.names import name_in
 from service.view.next import STATE_WORDS, choices, next_state
 from service.view.scene import SearchGround
 

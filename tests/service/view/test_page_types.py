@@ -14,7 +14,7 @@ from service.view.state import RunState
 
 FILE = Path(__file__).parents[3] / ".ci" / "page" / "state.d.ts"
 HEAD = "// What `/api/state` says, as service/view/state.py has it. Written by tests/service/view/test_page_types.py.\n"
-PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", types.NoneType: "null"}
+PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", types.NoneType: "null", Any: "any"}
 
 
 def typescript(kind: Any, found: dict[str, Any]) -> str:

@@ -5,8 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from service.rows import ReportRow
+import shapely
+
+from service.news.request import NewsRequest
+from service.rows import NewsRow, ReportRow, SortieRow, WithdrawnRow
+from service.view.maps import geojson_text
 from service.view.replay import ReplayView
+from tests.service.area.files import box, polygon
 from tests.service.export.recorded import SETTINGS, Recorder, record
 
 
@@ -47,6 +52,9 @@ def test_a_replay_knows_each_of_several_aircraft(tmp_path: Path) -> None:
             recorder.look(cell, hit=cell == cells[4])
     recorder.aircraft = {"aircraft": "kite"}
     recorder.write("transition", **{"from": "SEARCHING", "event": "hold", "to": "HOLDING", "reason": "test"})
+    for name in ("kite", "crow"):
+        recorder.aircraft = {"aircraft": name}
+        recorder.write("sortie", **SortieRow(1, recorder.time, 60.0, 3, 0.1, f"battery of {name}").body())
     recorder.journal.close()
     view = ReplayView(tmp_path)
     kite, crow = view.state()["aircraft"]
@@ -54,9 +62,38 @@ def test_a_replay_knows_each_of_several_aircraft(tmp_path: Path) -> None:
         ("kite", 0, "HOLDING"),
         ("crow", 1, "SEARCHING"),
     ]
+    own = [
+        [(each["aircraft"], each["number"], each["why"]) for each in one["sorties"]] for one in (kite, crow)
+    ]
+    assert own == [[("kite", 1, "battery of kite")], [("crow", 1, "battery of crow")]]
     where = recorder.grid.frame.to_latlon([cells[2], cells[4]]).tolist()
     assert [[kite["lat"], kite["lon"]], [crow["lat"], crow["lon"]]] == where
     assert (len(view.track()), len(view.hits()), view.state()["reports"]["accepted"]) == (3, 1, 5)
     view.seek(view.span()[0])
     assert [each["state"] for each in view.state()["aircraft"]] == ["READY", "WAITING"]
     assert view.hits() == []
+
+
+def test_a_replay_draws_news_where_they_were_told_and_while_they_stood(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path)
+    recorder.start()
+    recorder.look(next(recorder.cells()))
+    ground = polygon(box(160, 60, 200, 100))
+    feature = {"type": "Feature", "geometry": ground, "properties": {"role": "exclude"}}
+    news = NewsRequest.model_validate(feature).news(recorder.grid, "lz")
+    recorder.write("news", **NewsRow(news).body())
+    told = recorder.time
+    recorder.write("withdrawn", **WithdrawnRow("lz").body())
+    recorder.journal.close()
+    view = ReplayView(tmp_path)
+    assert view.state()["news"] == []
+    view.seek(told)
+    (shown,) = view.state()["news"]
+    assert shapely.equals(shapely.geometry.shape(shown["geometry"]), shapely.geometry.shape(ground))
+    features = json.loads(geojson_text(view.ground, view.moment()))["features"]
+    excluded = [each for each in features if each["properties"]["role"] == "exclude"]
+    assert len(excluded) == 2
+    assert excluded[1]["geometry"] == json.loads(json.dumps(shown["geometry"]))
+    with_it = view.picture()()
+    view.seek(told + 1.0)
+    assert view.picture()() != with_it

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import jsonschema
 import pytest
@@ -13,13 +16,16 @@ from service.clock import Clock
 from service.config import Settings
 from service.evidence.cover import sensors_over
 from service.http import create_app
+from service.mission.flight import Flight
+from service.mission.states import State
 from service.search import Search
 from service.survey import AREA, survey
-from service.view.live import RunView
+from service.view.live import RunView, flight_left_s, pose_of
 from service.view.replay import ReplayView
-from service.view.state import RunState
+from service.view.state import RunState, pose_state
 from tests.service.export.recorded import SETTINGS, record
 from tests.service.http.door import FakeRun
+from tests.service.mission.flown import START, reached, telemetry
 
 KNOWN_LIVE_ALONE = {"flight_left_s", "battery_percent", "battery_doubt", "link", "detector", "wind"}
 """What a journal does not keep."""
@@ -75,3 +81,27 @@ def test_steps_are_cells_flown_in_a_replay_too(tmp_path: Path) -> None:
     assert view.state()["steps"] > 0  # though its planner has journalled no decision
     assert view.decisions(10) == []
     assert view.state()["steps"] < len(flown)
+
+
+@pytest.mark.parametrize("heading", [0.0, 350.0, math.nan])
+def test_a_heading_that_is_not_known_is_told_as_that_and_not_as_north(heading: float) -> None:
+    flying: Any = SimpleNamespace(vehicle=SimpleNamespace(telemetry=telemetry(heading_deg=heading)))
+    pose = pose_state(pose_of(flying), "degrees")
+    assert pose is not None
+    assert pose["heading_deg"] == (None if math.isnan(heading) else heading)
+
+
+def test_the_time_left_is_that_of_this_sortie_by_the_aircrafts_own_settings() -> None:
+    talk = reached(
+        State.SEARCHING,
+        {"flight": {"max_flight_s": 600.0}},
+        flight=Flight(flown=True, carried_s=500.0, earlier_s=500.0, left_at=START),
+    )
+    talk.pass_by(100.0)
+    mission: Any = SimpleNamespace(
+        core=talk.core, energy=SimpleNamespace(seconds_left=lambda flight: 5000.0), flight=talk.core.flight
+    )
+    assert talk.core.flight.seconds(talk.now) > 590.0
+    left = flight_left_s(mission, talk.now)
+    assert left is not None
+    assert 450.0 < left < 510.0

@@ -161,9 +161,8 @@ def test_however_many_clues_leave_a_belief_that_is_one(factors: list[float], tim
     cells = list(range(int(HALF_OUTSIDE.searchable.sum())))[:count]
     known = Known(HALF_OUTSIDE, 0.9, 0.97)
     for number, factor in enumerate(factors * times):
-        known._field.append(
-            clue(number, factor, cells)
-        )  # not one after the other: each reckons all of them anew
+        said = clue(number, factor, cells)
+        known._field.append(said)  # not taken one after the other, as each has all of them reckoned anew
     known.take(clue(-1, factors[0], cells), 1000.0)
     there, outside = known.belief.probability(), known.belief.outside
     assert np.isfinite(there).all()

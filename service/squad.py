@@ -182,10 +182,12 @@ class Squad:
     async def _judge(self, command: str, place: LatLon | None) -> OrderReceipt:
         """A person's word on a place: believed once, and then told to all."""
         first = next((each for each in self.missions.values() if each.found is not None), self.leading)
+        before = {name: each.core.overtaken for name, each in self.missions.items()}
         receipt = await first.order(command, place)
-        for each in self.missions.values():
+        for name, each in self.missions.items():
             if each is not first and each.state not in FINAL and not receipt.refused:
-                await each.judged(confirmed=command == "confirm")
+                moves = each.core.overtaken == before[name]  # nobody has stopped it since
+                await each.judged(confirmed=command == "confirm", moves=moves)
         return receipt
 
     def _named(self, aircraft: str) -> Mission:

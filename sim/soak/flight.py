@@ -248,6 +248,9 @@ class SoakFlight:
                 self._control.fault("pilot")
             time.sleep(options["wall_s"])
             self._service.process.send_signal(signal.SIGCONT)
+        elif kind == "hangup":
+            self._service.process.send_signal(signal.SIGHUP)  # the terminal is gone, and the flight goes on
+            self._pass(fault.seconds)
         elif kind == "garbage":
             for _ in range(50):
                 self._tap.say_bytes(self._rng.bytes(int(self._rng.integers(1, 300))))

@@ -164,6 +164,7 @@ KINDS: dict[str, Kind] = {
     "stall": Kind(2, (0, 0), lambda rng: {"wall_s": float(rng.uniform(0.3, 5.0))}),
     "killed": Kind(2, (0, 0)),
     "journal_locked": Kind(1, (5, 40)),
+    "hangup": Kind(0.5, (1, 5)),
     # what the vehicle tells
     "one_way": Kind(1, (2, 20), lambda rng: {"carries": str(rng.choice(["down", "up"]))}),
     "stream_stops": Kind(2, (5, 40), _stream),

@@ -32,8 +32,8 @@ WAYS = (BOUND, FLEET, INDEPENDENT, STRIPS)
 P_TP = 0.9
 ALLOCATED_S = (0.0, 0.0, 0.0, 25.0, 50.0, 100.0, 200.0, 400.0)
 """When a fleet shares its search out anew: thrice before it sets out, and seldom later."""
-FIRST = 5000
-"""The first prior unless told; several searchers were developed looking at this one and the next three."""
+FIRST = 5004
+"""The first prior unless told; several searchers were developed looking at the four before it."""
 
 
 @dataclass(frozen=True)

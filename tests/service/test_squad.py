@@ -49,6 +49,9 @@ class StandIn:
         self.refusal = ""
         self.means_something = True
         self.judgements: list[bool] = []
+        self.core = SimpleNamespace(overtaken=0)
+        self.meanwhile = lambda: None
+        self.may_move = True
         self.found: object | None = None
         self.flight = SimpleNamespace(hits=[])
         self.intake = SimpleNamespace(submit_all=self.take, refuse=self.refuse, counts=Counts())
@@ -59,13 +62,15 @@ class StandIn:
     ) -> OrderReceipt:
         self.orders.append(command)
         self.wanted_system = system_id
+        self.meanwhile()
         return OrderReceipt(state=self.state, refused=self.refusal or None)
 
     def concerned(self, command: str) -> bool:
         return self.means_something
 
-    async def judged(self, *, confirmed: bool) -> OrderReceipt:
+    async def judged(self, *, confirmed: bool, moves: bool = True) -> OrderReceipt:
         self.judgements.append(confirmed)
+        self.may_move = moves
         return OrderReceipt(state=self.state)
 
     async def take(self, reports: Sequence[Report]) -> list[Receipt]:
@@ -176,6 +181,14 @@ def test_a_word_on_a_place_is_believed_once_and_told_to_all() -> None:
     asyncio.run(both.order("reject"))
     assert (south.orders, south.judgements) == (["reject"], [])
     assert (north.orders, north.judgements) == ([], [False])
+    assert north.may_move
+
+
+def test_a_word_on_a_place_moves_nobody_who_was_stopped_while_it_waited_for_the_disk() -> None:
+    north, south, both = two()
+    north.meanwhile = lambda: setattr(south.core, "overtaken", 1)  # a hold, or its pilot
+    asyncio.run(both.order("confirm", place=(47.0, 8.3)))
+    assert (south.judgements, south.may_move) == ([True], False)
 
 
 def report(number: int, **more: Any) -> Report:

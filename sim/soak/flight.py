@@ -348,6 +348,8 @@ class SoakFlight:
                 self._control.clear(None)
                 self._order("resume" if self._rng.random() < 0.9 else "return")
                 helped += 1
+                if self._wing is not None and helped >= 3:
+                    self._order("finish")  # one is left that an order for all does not take from its pilot
             if time.monotonic() - began > _PATIENCE_S:
                 raise Trouble(f"still {state} after {_PATIENCE_S:.0f} s")
             time.sleep(0.1)
@@ -360,7 +362,7 @@ class SoakFlight:
         while self._service.process.poll() is None and self._state() not in _FINAL:
             if self._state() in (*_FLYING, "FOUND", "HOLDING", "YIELDED") and time.monotonic() - last > 3.0:
                 last = time.monotonic()
-                self._order("return")
+                self._order("return" if self._wing is None or last - began < 20.0 else "finish")
             if time.monotonic() - began > _PATIENCE_S:
                 raise Trouble(f"not home but {self._state()} after {_PATIENCE_S:.0f} s")
             time.sleep(0.1)

@@ -88,6 +88,7 @@ class Judge:
         with self._lock:
             self._ordered_at, self._taken_at = now, math.inf
             self._stopped_at, self._stopped_by = math.inf, ""
+            self._stop = None  # a person's hold stops it anew
 
     def stopped(self, now: float, by: str) -> None:
         """A person (`by`) has stopped the aircraft: until an operator orders something nothing of ours moves it."""

@@ -45,6 +45,7 @@ from service.mission.effects import (
     row,
 )
 from service.mission.entering import entered, phase_of
+from service.mission.excluded import other_ground
 from service.mission.finding import found_after_all, not_enough_after_all, over_for_all
 from service.mission.flight import Flight
 from service.mission.grounded import Grounded
@@ -87,7 +88,6 @@ from service.mission.phase import (
     Stay,
     Unsettle,
     Wish,
-    say,
     warn,
 )
 from service.mission.reserve import Reserve
@@ -105,7 +105,6 @@ from service.mission.states import (
     FINAL,
     FLYING,
     MAY_MOVE,
-    MOVING,
     SEARCHED_TO,
     Event,
     State,
@@ -608,26 +607,13 @@ class MissionCore:
             self._emit(Answer(pending.ticket, failed))
 
     def _fly_around(self, grid: Grid) -> None:
-        """Other ground is excluded now: a leg that would cross it is stopped here, before it is planned anew."""
-        t, known = self._seen.telemetry, self.chart.grid.layout_notes
+        """Other ground is excluded now, or other ground can be seen."""
+        known = self.chart.grid.layout_notes
         self.chart.take(grid)
-        for note in grid.layout_notes:
-            if note not in known:
-                self._want(say(note, self._look()))
-        crosses = self.helm.crosses(t)
+        crosses = self.helm.crosses(self._seen.telemetry)
         self.helm.regrid()
         self.reserve.forget_way()
-        hovers = self.standing.state in (State.HOLDING, State.FOUND) and not on_ground(t)
-        if hovers and self.chart.excluded(here(t)):
-            self._want(warn("it hovers over ground that is excluded now", self._look()))
-        if crosses and self.standing.state in MOVING and not self.standing.goes_home_by_itself:
-            self._emit(
-                Note("the leg that was flown crosses ground that is excluded now: stopping first", _WARNING)
-            )
-            self._stop()
-        elif self.standing.autopilot_returns and not self.chart.leg_allowed(here(t), self.chart.home(t)):
-            said = "the autopilot's way home may cross ground that is excluded now"
-            self._want([Note(said, _WARNING), Tell(f"search {self.standing.state}: {said}", 4)])
+        self._want(other_ground(self._look(), known, crosses=crosses))
 
     def _decided(self, thought: Thought) -> None:
         decision, self.reason = thought.decision, thought.reason

@@ -23,6 +23,7 @@ from sim.autopilot.control import Control
 _METRES_PER_DEGREE = 111_194.93
 GAP_M = 6.5
 """Of a layer of 10 m; what flies about its height may leave a little less than it is allowed to plan with."""
+STANDS_S, STILL_MPS = 8.0, 1.0
 EVERY_S = 0.01  # wall time
 
 
@@ -40,6 +41,10 @@ class Separation:
         self.violations: list[str] = []
         self.nearest_m = math.inf
         """The nearest that two of no more than `gap_m` between their heights came."""
+        self.taken: frozenset[str] = frozenset()
+        """Who may be flown by somebody else just now, a pilot or a failsafe: it goes where it goes, and whoever comes
+        too near to it has to stand still within STANDS_S."""
+        self._since: dict[tuple[str, str], float] = {}
         self.together = 0
         """Moments at which two were in the air, which is when there was something to judge."""
 
@@ -74,6 +79,9 @@ class Separation:
             return
         self.nearest_m = min(self.nearest_m, metres)
         if metres >= self._separation_m:
+            self._since.pop((first, second), None)
+            return
+        if self.taken & {first, second} and self._stands((first, second), around[1], b):
             return
         said = (
             f"aircraft {first} and {second} were {metres:.1f} m apart, {a['up']:.1f} and {b['up']:.1f} m high"
@@ -82,6 +90,12 @@ class Separation:
         if (first, second) not in self._near:
             self._near[first, second] = len(self.violations)
             self.violations.append(said)
+
+    def _stands(self, pair: tuple[str, str], a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+        """Of two, one of whom may be flown by somebody else, the other stands, or came too near only just now."""
+        since = self._since.setdefault(pair, a["time"])
+        others = [state for name, state in zip(pair, (a, b), strict=True) if name not in self.taken]
+        return a["time"] - since < STANDS_S or all(state["speed"] < STILL_MPS for state in others)
 
 
 class Watching:

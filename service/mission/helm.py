@@ -122,7 +122,7 @@ class Helm:
     def beside(self, t: Telemetry, others: Sequence[Other]) -> str:
         """That it lands where another aircraft lands, and may stand, when a person should know, or nothing."""
         for other in others:
-            if t.home is None or other.system_id is None:  # not told yet
+            if t.home is None or other.home == self._chart.grid.launch:  # one is not told yet
                 continue
             metres = math.hypot(*offset_m(self._chart.home(t), other.home))
             if metres < BESIDE_M:

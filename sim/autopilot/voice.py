@@ -80,7 +80,8 @@ def in_mavlink1(message: Any, codec: Any) -> bytes | None:
         return None
     writer = old.MAVLink(None, srcSystem=codec.srcSystem, srcComponent=codec.srcComponent)
     writer.seq = codec.seq
-    frame: bytes = cls(*(getattr(message, field) for field in cls.fieldnames)).pack(writer)
+    fields = (getattr(message, field) for field in cls.fieldnames)
+    frame: bytes = cls(*(each.encode() if isinstance(each, str) else each for each in fields)).pack(writer)
     return frame
 
 

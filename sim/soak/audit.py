@@ -23,6 +23,7 @@ from sim.soak import ground
 _MAY_STOP = {"HOLDING", "FOUND", "CONFIRMING", "SEARCHING"}
 """CONFIRMING for another look at a suspect, SEARCHING where the ground forbids a leg by now: it is planned anew."""
 _READ_ELSEWHERE = {timebase.ROW}  # how the clocks stood
+_WRONG_CELLS = 2.0
 _MOST_STOPS = 4  # in a hold: the one at its beginning, and again when one may have been lost
 _MAY_MOVE = {"TAKEOFF", "SEARCHING", "CONFIRMING", "RETURNING"}
 Told = tuple[int, str]
@@ -86,6 +87,19 @@ def audit(
         *_adds_up(folder, rows, told),
         *_believes_the_true(folder, rows, target),
     ]
+
+
+def wrongly_found(folder: Path, target: ground.LatLon | None) -> list[str]:
+    """Whether a run's report says that the target was found where it is not, or where there is none."""
+    report = folder / "report.json"
+    found: Any = json.loads(report.read_text(encoding="utf-8")) if report.exists() else {}
+    if found.get("outcome") != "found":
+        return []
+    if target is None:
+        return ["found what is not there"]
+    east, north = ground.metres((found["position"]["lat"], found["position"]["lon"]))
+    away = math.dist((east, north), ground.metres(target))
+    return [f"found {away:.0f} m from the target"] if away > _WRONG_CELLS * ground.CELL_M else []
 
 
 def _readable(journal: Path) -> list[str]:

@@ -36,13 +36,29 @@ def misplaced(way: str, seen: dict[str, Any]) -> dict[str, float]:
     return {"lat": lat, "lon": lon}
 
 
+def distort(way: str, frame: dict[str, Any], state: dict[str, Any], stood: float) -> None:
+    """Make of a frame what a detector that lies in some way says: the target in every cell, or an hour ago (`stood`,
+    whatever the time is), or from another place."""
+    if way == "everywhere":
+        cells = [each for each in state["footprint"]["cells"] if each["counts"]]
+        frame["detections"] = [
+            {"class": "target", "score": 0.9, "lat": each["lat"], "lon": each["lon"]} for each in cells
+        ]
+    elif way == "still":
+        frame["captured_at"] = stood
+    elif way == "pose":
+        pose = state["pose"]
+        frame["pose"] = {"lat": pose["lat"] + 0.01, "lon": pose["lon"], "height_m": 15.0, "heading_deg": 0.0}
+
+
 class Eyes:
     """Two threads beside one service; `violations` are sentences.
 
     Attributes:
         silent, repeats, rude: switches of the detector: it says nothing, says everything twice, or sends what is no
             report in between.
-        lies: how it places what it sees: "swapped" (latitude for longitude), "nowhere" (0/0), "far" (a kilometre off).
+        lies: how it places what it sees: "swapped" (latitude for longitude), "nowhere" (0/0), "far" (a kilometre off);
+            or how else it is wrong: see `distort`.
         clock_off_s: how far the computer's clock has been stepped since the service began. `own_clock`: the detector
             goes by that, and otherwise by the service's: a flight faster than the wall clock knows no other.
         aircraft: whose camera it is; empty: of the only one.
@@ -55,6 +71,7 @@ class Eyes:
         self.silent = self.repeats = self.rude = False
         self.lies = self.aircraft = ""
         self.clock_off_s, self._own_clock = 0.0, own_clock
+        self._stood = 0.0  # when its clock stopped
         self.true_hits: set[str] = set()
         self.acknowledged: set[str] = set()
         self.told: list[Told] = []
@@ -107,6 +124,8 @@ class Eyes:
             frame["captured_at"] += self.clock_off_s
         for seen in frame["detections"]:
             seen.update(misplaced(self.lies, seen))
+        self._stood = frame["captured_at"] if self.lies != "still" else self._stood
+        distort(self.lies, frame, state, self._stood)
         for _ in range(2 if self.repeats else 1):
             for receipt in door.post("/api/reports", json=frame).raise_for_status().json():
                 if receipt["status"] == "accepted":

@@ -11,7 +11,7 @@ import sqlite3
 import subprocess
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +25,7 @@ from sim.autopilot.process import AutopilotProcess
 from sim.detector import Detector
 from sim.grounds import write_heights
 from sim.soak import clocked, ground
-from sim.soak.audit import Target, audit
+from sim.soak.audit import Target, audit, wrongly_found
 from sim.soak.clocked import SteppedClock
 from sim.soak.eyes import Eyes, grown
 from sim.soak.judge import AFTER, OPERATOR, Judge
@@ -189,10 +189,20 @@ class SoakFlight:
             self._come_to(fault.moment)
             self.outcome.faults[fault.kind] += 1
             self.judge.steady, self.judge.during = KINDS[fault.kind].steady, fault.kind
-            self._let(fault)
-            if fault.moment != HOME:
-                self._recover()
+            with self._taken():
+                self._let(fault)
+                if fault.moment != HOME:
+                    self._recover()
         self._go_home()
+
+    @contextlib.contextmanager
+    def _taken(self) -> Iterator[None]:
+        """While something goes wrong with the first aircraft, it may be flown by another, or by nobody."""
+        if self._wing is not None:
+            self._wing.judge.taken = frozenset({"1"})
+        yield
+        if self._wing is not None:
+            self._wing.judge.taken = frozenset()
 
     def _come_to(self, moment: str) -> None:
         """Let the operator bring about the moment of a fault; what cannot be ordered now is left as it is."""
@@ -456,6 +466,7 @@ class SoakFlight:
         for run in self._alive_runs() if hasattr(self, "_runs") else []:
             refuses = "command_refused" in outcome.faults
             outcome.violations += audit(run, acknowledged, told, target, refuses=refuses)
+            outcome.violations += wrongly_found(run, place)
         for word in _BAD_WORDS:
             if word in outcome.said:
                 line = next(line for line in outcome.said.splitlines() if word in line)

@@ -26,6 +26,7 @@ _DRAIN = 1.3 * 100.0 / ground.ENDURANCE_S  # percent a second that flying takes 
 _LEAST_PERCENT = 15.0  # the service goes home at 20
 _UNKNOWN_S = 30.0  # without a level for so long, it is not known on the ground
 _SETTLED_S = 25.0  # a search has reached its height after so long
+_STOP_AGAIN_S = 5.0  # later than that it is one that may have been lost, which the journal counts
 _NEAR_M = 60.0  # a stop lies this far ahead at most
 _ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 _BRAKE = 17  # ArduCopter's mode
@@ -65,6 +66,7 @@ class Judge:
         self._ordered_at = -math.inf
         self._sent_away_at = -math.inf  # when we last asked for another mode
         self._stop: ground.LatLon | None = None
+        self._stopped_there_at = -math.inf
         self._homes: deque[float] = deque(maxlen=_POSITIONS)  # metres above sea level, as told
         self._grounds: deque[float] = deque(
             maxlen=_POSITIONS
@@ -235,9 +237,11 @@ class Judge:
         if now - self._not_guided_since > self._late_s:
             found.append(f"the mode has not been the guided one for {now - self._not_guided_since:.2f} s")
         if self.state in _HOVER:
-            if self._stop is not None and self._stop != there:
+            soon = (now - self._stopped_there_at) * self._speedup < _STOP_AGAIN_S
+            if self._stop is not None and self._stop != there and soon:
                 found.append("a second stop in one hover")
-            self._stop = there
+            if self._stop != there:
+                self._stop, self._stopped_there_at = there, now
             if self._positions and min(_distance(here, there) for here in self._positions) > _NEAR_M:
                 found.append("a stop far away")
         else:

@@ -108,7 +108,7 @@ def _goal(rng: Generator) -> Options:
 
 
 def _lying_detector(rng: Generator) -> Options:
-    return {"way": str(rng.choice(["swapped", "nowhere", "far"]))}
+    return {"way": str(rng.choice(["swapped", "nowhere", "far", "everywhere", "still", "pose"]))}
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from service.journal import Journal
 from sim.autopilot import faults
 from sim.detector import Detector
 from sim.soak import ground
-from sim.soak.audit import Target, audit
+from sim.soak.audit import Target, audit, wrongly_found
 from sim.soak.clocked import CLOCK_FILE, SteppedClock
-from sim.soak.eyes import Eyes, grown, misplaced
+from sim.soak.eyes import Eyes, distort, grown, misplaced
 from sim.soak.kinds import AT_BOOT, KINDS
 from sim.soak.plan import draw_plan
 from tests.integration.flight import REPOSITORY
@@ -78,6 +78,31 @@ def test_a_detector_that_lies_says_another_place() -> None:
     assert misplaced("nowhere", seen) == {"lat": 0.0, "lon": 0.0}
     assert misplaced("far", seen)["lat"] > 47.008
     assert misplaced("", seen) == seen
+
+
+def test_a_detector_that_lies_says_another_time_another_place_or_everything() -> None:
+    state = {
+        "pose": {"lat": 47.0, "lon": 8.0},
+        "footprint": {
+            "cells": [{"counts": counts, "lat": 47.0, "lon": 8.0} for counts in (True, True, False)]
+        },
+    }
+    frame: dict[str, Any] = {"detections": [], "captured_at": 1000.0}
+    distort("", frame, state, 900.0)
+    assert frame == {"detections": [], "captured_at": 1000.0}
+    for way in ("everywhere", "still", "pose"):
+        distort(way, frame, state, 900.0)
+    assert (len(frame["detections"]), frame["captured_at"], frame["pose"]["lat"]) == (2, 900.0, 47.01)
+
+
+def test_the_audit_sees_what_was_found_where_nothing_is(tmp_path: Path) -> None:
+    assert wrongly_found(tmp_path, None) == []  # broken off before there was a report
+    place = {"lat": ground.BOUNDS["south"], "lon": ground.BOUNDS["west"]}
+    (tmp_path / "report.json").write_text(json.dumps({"outcome": "found", "position": place}))
+    assert wrongly_found(tmp_path, None) == ["found what is not there"]
+    assert wrongly_found(tmp_path, (place["lat"], place["lon"])) == []
+    (said,) = wrongly_found(tmp_path, (place["lat"] + 0.001, place["lon"]))
+    assert said == "found 111 m from the target"
 
 
 STATE = {

@@ -49,6 +49,16 @@ def test_one_encounter_is_one_violation_and_the_next_one_another() -> None:
     assert judge.together == 6
 
 
+@pytest.mark.parametrize(("speed", "guilty"), [(0.2, False), (3.0, True)])
+def test_beside_one_that_somebody_else_flies_the_other_has_to_stand_soon(speed: float, guilty: bool) -> None:
+    judge = Separation()
+    judge.taken = frozenset({"1"})
+    for now in (0.0, 5.0, 9.0):
+        here = {"time": now, "speed": 5.0}
+        judge.see({"1": state(0.0, 30.0) | here, "2": state(15.0, 30.0) | {"time": now, "speed": speed}})
+        assert bool(judge.violations) == (guilty and now > 8.0)
+
+
 def test_who_has_flown_on_between_two_answers_is_judged_by_where_it_surely_was() -> None:
     """On a busy machine the second is asked late: by then the first has flown from 40 m away to 10 m beyond it."""
     judge = Separation()

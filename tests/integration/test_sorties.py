@@ -36,7 +36,7 @@ def test_a_killed_search_goes_on_from_the_ground_on_another_computer_with_anothe
         pack(Path(the_run(scene)), tmp_path / "field.zip")
         scene.runs = tmp_path / "other computer"
         again = ["--resume", str(tmp_path / "field.zip"), "--runs", str(scene.runs)]
-        again += ["--connect", f"udpout://127.0.0.1:{mock.port}"]
+        again += ["--connect", f"udpout://127.0.0.1:{mock.port}", "--takeoff"]
         with restarted(scene, *again) as (service, door):
             comes_to(door, "GROUNDED")
             assert scene.tap.motions[motions:] == []

@@ -224,7 +224,7 @@ class SoakFlight:
                 raise Trouble(f"the search has not begun, but is {state}")
             if state in ("HOLDING", "YIELDED", "READY") and (now - helped) * self.speedup > _HELP_AFTER_S * 4:
                 helped = now
-                self._order("resume" if self._truth()["armed"] else "launch")
+                self._order("resume" if self._truth()["armed"] else "launch", first=True)
             time.sleep(0.1)
 
     def _stay_down(self, words: str) -> None:
@@ -397,9 +397,11 @@ class SoakFlight:
         self.outcome.steps = max(self.outcome.steps, told["steps"])
         return str(told["state"])
 
-    def _order(self, command: str) -> None:
+    def _order(self, command: str, *, first: bool = False) -> None:
+        """Order it of all, or of the `first` alone, whom the faults befall: no order for all takes it from a pilot."""
         self.judge.ordered(time.monotonic())
-        self._post("/api/commands", {"command": command}, refused=True)
+        named = {"aircraft": "1"} if first and self._wing is not None else {}
+        self._post("/api/commands", {"command": command, **named}, refused=True)
         self.judge.ordered(time.monotonic())
 
     def _post(self, path: str, body: dict[str, Any], *, refused: bool = False) -> Any:

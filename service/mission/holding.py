@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from service.mission.effects import EnterGuided, Stop
 from service.mission.limits import hold_objection, not_airborne
 from service.mission.phase import RETRY_S, Happen, Phase, Release, Wish
-from service.mission.situation import hovering
+from service.mission.situation import hovering, on_ground
 from service.mission.standing import Look
 from service.mission.states import Event
 
@@ -47,7 +47,8 @@ class Holding(Phase):
             yield EnterGuided(there=True)
         if now >= self._again_at and look.heard():  # to whom is not heard nothing is sent
             self._again_at = math.inf
-            yield Stop()
+            if not on_ground(t):  # a climb that was broken off in time: what stands disarmed needs no stop
+                yield Stop()
         if low and look.heard() and t.in_control:  # which needs no position, nor a journal
             direct = standing.homeward or bool(causes & BLIND)
             yield Happen(Event.ENERGY_LOW, low, stopped=low, searched=True, direct=direct)

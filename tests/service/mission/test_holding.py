@@ -12,7 +12,7 @@ from service.mission.effects import Land, ReturnToLaunch, Stop
 from service.mission.news import Judged, NotStopped, Order
 from service.mission.states import State
 from sim.soak import ground
-from tests.service.mission.flown import FOUND, Talk, reached, searching
+from tests.service.mission.flown import FOUND, ON_GROUND, Talk, reached, searching
 
 
 def silenced(after_silence: str = "resume") -> Talk:
@@ -174,6 +174,17 @@ def test_a_contradiction_about_home_holds_until_it_is_gone() -> None:
     talk.pass_by(10.0)
     assert talk.state == State.SEARCHING
     assert talk.core.helm.leg(talk.core.chart.grid.launch, talk.seen.telemetry).altitude_m == 435.0
+
+
+def test_a_climb_that_was_broken_off_on_the_ground_is_not_stopped_again_and_again() -> None:
+    talk = reached(State.TAKEOFF)
+    talk.on(Order("hold"))
+    talk.shows(**ON_GROUND)
+    talk.on(NotStopped("the aircraft is not armed"))
+    talk.wanted.clear()
+    talk.pass_by(5.0)
+    assert talk.state == State.HOLDING
+    assert Stop() not in talk.wanted
 
 
 def test_a_stop_is_not_tried_again_and_again_while_nobody_is_heard() -> None:

@@ -105,13 +105,9 @@ def note_resumption(journal: Journal, folder: Path, settings: Settings) -> None:
     """
     refuse_changed(folder, settings, journal.meta(FINGERPRINTS))
     _number(journal, folder)
-    begun_by = journal.meta(VERSION)  # early runs do not say
-    if begun_by != version("roisearch"):
-        log.info(
-            "this run was begun by roisearch %s and goes on with %s",
-            begun_by or "0.2 or 0.3",
-            version("roisearch"),
-        )
+    begun_by, ours = journal.meta(VERSION) or "of an early version", version("roisearch")
+    if begun_by != ours:
+        log.info("this run was begun by roisearch %s and goes on with %s", begun_by, ours)
     changed = changes(stored_settings(journal.path, {}), settings)
     told = {key: "(not told)" if value and key in _SECRETS else value for key, value in changed.items()}
     tell_changes(told)

@@ -153,9 +153,8 @@ class MissionCore:
         """The action under way."""
         self.overtaken = 0
         """How often a person has stopped the aircraft, or taken it: an order of before counts no more then."""
-        self._left = self._flown_as = (
-            self.standing
-        )  # as an earlier process left it; and what is asked of it since
+        # as an earlier process left it; with what was asked of it since, and without
+        self._left = self._flown_as = self.standing
         self._logbook = Logbook(self.flight, self._left)
         self.standing = replace(
             self.standing, state=State.WAITING, causes=frozenset(), homeward=self._left.goes_home
@@ -458,9 +457,7 @@ class MissionCore:
         if objection.cause in ("position", "limits") or self._too_low > GIVEN_UP_AFTER:
             self._too_low = 0
             self._want([Hold(objection.cause if objection.cause != "ground" else "limits", objection.reason)])
-        elif (
-            objection.cause == "ground"
-        ):  # the aircraft has come nearer since the leg was planned: plan it anew
+        elif objection.cause == "ground":  # it has come nearer since the leg was planned: plan it anew
             self._emit(Note(f"waypoint not sent: {objection.reason}", _WARNING))
             self._stop()
         elif objection.cause != "apart" or objection.reason != self._kept_from:
@@ -504,9 +501,7 @@ class MissionCore:
             self._emit(LetGo(wish.reason))
         if after in (State.DONE, State.GROUNDED):
             self._want(self._logbook.lands(self._seen, self._now, self.standing.why_stopped or wish.reason))
-        if (
-            before == State.GROUNDED
-        ):  # the next sortie has a battery of its own, whatever was said of the last one
+        if before == State.GROUNDED:  # the next sortie has a battery of its own
             self.reserve = self._fresh_reserve()
             if after not in FINAL:
                 self._emit(PlanAnew())

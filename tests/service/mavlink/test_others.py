@@ -20,6 +20,13 @@ def searching(flavor: str) -> Rig:
     return rig
 
 
+def names(rig: Rig, lat: float) -> None:
+    """It names a target, once, a moment later."""
+    rig.now += 0.1
+    rig.peer.target = (lat, LON, ALT)
+    rig.say(rig.peer.position_target(rig.now))
+
+
 @FLAVORS
 @pytest.mark.parametrize(
     "theirs", [(LAT - 0.001, LON, ALT), (NORTH, LON, ALT + 10.0)], ids=["go to", "change altitude"]
@@ -65,14 +72,10 @@ def test_the_last_target_of_ours_that_it_took_is_no_strangers_however_many_it_do
 @FLAVORS
 def test_a_waypoint_waits_while_somebody_else_may_just_have_given_one(flavor: str) -> None:
     rig = searching(flavor)
-    rig.now += 0.1
-    rig.peer.target = (LAT - 0.001, LON, ALT)
-    rig.say(rig.peer.position_target(rig.now))
+    names(rig, LAT - 0.001)
     with pytest.raises(NotPermitted, match="somebody else"):
         go(rig, LAT + 0.0006)
-    rig.now += 0.1
-    rig.peer.target = (NORTH, LON, ALT)
-    rig.say(rig.peer.position_target(rig.now))
+    names(rig, NORTH)
     go(rig, LAT + 0.0006)
     assert rig.of(TargetReplaced) == []
 
@@ -80,9 +83,7 @@ def test_a_waypoint_waits_while_somebody_else_may_just_have_given_one(flavor: st
 @FLAVORS
 def test_a_suspicion_that_nothing_follows_ends_and_never_keeps_a_stop_from_going_out(flavor: str) -> None:
     rig = searching(flavor)
-    rig.now += 0.1
-    rig.peer.target = (LAT - 0.001, LON, ALT)
-    rig.say(rig.peer.position_target(rig.now))
+    names(rig, LAT - 0.001)
     rig.peer.target = None  # the stream stops
     with pytest.raises(NotPermitted, match="somebody else"):
         go(rig, LAT + 0.0006)
@@ -99,9 +100,7 @@ def test_who_was_overtaken_by_a_waypoint_on_its_way_gets_the_aircraft(flavor: st
     rig = searching(flavor)
     go(rig, LAT + 0.0006)
     for lat in (LAT - 0.001, LAT + 0.0006):
-        rig.now += 0.1
-        rig.peer.target = (lat, LON, ALT)
-        rig.say(rig.peer.position_target(rig.now))
+        names(rig, lat)
     (replaced,) = rig.of(TargetReplaced)
     assert replaced.found.lat == pytest.approx(LAT - 0.001)
     assert not rig.core.in_control

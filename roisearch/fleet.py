@@ -35,8 +35,8 @@ LEAST_HORIZON = 1000
 AHEAD_S = 600.0
 """How far ahead committed looks count for a planner that cannot tell when they are made, in seconds, unless told.
 
-Three searchers that plan in seconds, from one corner of 100 x 100 cells of 25 m, on three priors (1000 to 1002): 0.40 of
-one searcher's time with these ten minutes, 0.46 with two minutes and 0.46 with 25.
+Three searchers that plan in seconds, from one corner of 100 x 100 cells of 25 m, on three priors (1000 to 1002):
+0.40 of one searcher's time with these ten minutes, 0.46 with two minutes and 0.46 with 25.
 """
 
 

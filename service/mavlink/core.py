@@ -376,6 +376,8 @@ class LinkCore(LinkMemory):
         kind = autopilot.mode_kind(t.mode)
         self._events.append(ModeChanged(now, t.mode, previous, kind, t.guided, commanded, failsafe))
         self._strangers.start_over()
+        if not self._control.asked_for(now):
+            self._strangers.look_again()
         self._cruise.start_over()
         if not commanded:
             self._stand_down(f"the mode was changed to {mode_title(t.mode)} and not by us", now)

@@ -219,8 +219,10 @@ class LinkMemory:
         now = self._now
         assert now is not None
         if command.goal_mode is not None:
-            self._control.expect(command.goal_mode, now + self.settings.mode_window_s)
-            self._strangers.look_away(now + self.settings.mode_window_s)
+            until = now + self.settings.mode_window_s
+            if self._control.asked_for(now) or command.goal_mode != self.telemetry.mode:
+                self._strangers.look_away(until)
+            self._control.expect(command.goal_mode, until)
         if command is self._stop:
             self._stop_sent = now
             self._strangers.start_over()

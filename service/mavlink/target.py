@@ -91,6 +91,10 @@ class Strangers:
         self._off_until = until
         self.start_over()
 
+    def look_again(self) -> None:
+        """The mode that we have asked for is there."""
+        self._off_until = -math.inf
+
     def start_over(self) -> None:
         """It may go anywhere by itself now."""
         self._ours.clear()

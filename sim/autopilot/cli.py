@@ -194,7 +194,7 @@ async def _serve(
                 return 2
             print(f"listening on {bound}", flush=True)
         if control_at is not None:
-            server = await control.serve(mock.autopilot, *control_at, driver.set_speedup, mock.flush)
+            server = await control.serve(mock.autopilot, *control_at, driver, mock.flush)
             host, port = server.sockets[0].getsockname()[:2]
             print(f"control on tcp://{host}:{port}", flush=True)
         async with asyncio.TaskGroup() as group:

@@ -4,6 +4,7 @@
     {"clear": "gps_lost"} or {"clear": null}          end the faults of a kind, or all
     {"state": null}                                   the truth about the vehicle
     {"speedup": 20}                                   times faster than the wall clock
+    {"waits": false}                                  in lockstep: wait for nobody any more, or again
     {"replace": {"flavor": "px4", "sysid": 7}}        another vehicle in its place, on the same lines
 
 Each line is answered by one: {"ok": true, ...} or {"error": "what is wrong"}. It is for tests and
@@ -18,12 +19,22 @@ import math
 import socket
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 from sim.autopilot.core import Autopilot
 from sim.autopilot.faults import Fault
 
-WORDS = "fault, clear, state, speedup, replace"
+WORDS = "fault, clear, state, speedup, waits, replace"
+
+
+class Clock(Protocol):
+    """What moves the mock's time on."""
+
+    def set_speedup(self, speedup: float) -> None:
+        """Run so many times faster than the wall clock."""
+
+    def set_waits(self, waits: bool) -> None:
+        """Wait for who flies in lockstep, or not."""
 
 
 def state_of(autopilot: Autopilot) -> dict[str, Any]:
@@ -53,7 +64,7 @@ def state_of(autopilot: Autopilot) -> dict[str, Any]:
     }
 
 
-def answer(autopilot: Autopilot, line: bytes, set_speedup: Callable[[float], None]) -> dict[str, Any]:
+def answer(autopilot: Autopilot, line: bytes, clock: Clock) -> dict[str, Any]:
     """Obey one line."""
     try:
         asked = json.loads(line)
@@ -69,7 +80,11 @@ def answer(autopilot: Autopilot, line: bytes, set_speedup: Callable[[float], Non
         elif word == "speedup":
             if not isinstance(value, int | float) or not 0.01 <= value <= 100:
                 raise ValueError("speedup is from 0.01 to 100")
-            set_speedup(float(value))
+            clock.set_speedup(float(value))
+        elif word == "waits":
+            if not isinstance(value, bool):
+                raise ValueError("waits is true or false")
+            clock.set_waits(value)
         elif word == "replace":
             _replace(autopilot, value)
         else:
@@ -91,7 +106,7 @@ async def serve(
     autopilot: Autopilot,
     host: str,
     port: int,
-    set_speedup: Callable[[float], None],
+    clock: Clock,
     flush: Callable[[], None],
 ) -> asyncio.Server:
     """Open the control socket."""
@@ -99,7 +114,7 @@ async def serve(
     async def client(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
             while line := await reader.readline():
-                reply = answer(autopilot, line, set_speedup)
+                reply = answer(autopilot, line, clock)
                 flush()
                 writer.write(json.dumps(reply).encode() + b"\n")
                 await writer.drain()
@@ -160,3 +175,7 @@ class Control:
     def speedup(self, factor: float) -> None:
         """Run so many times faster than the wall clock."""
         self.ask(speedup=factor)
+
+    def waits(self, waits: bool) -> None:
+        """In lockstep: wait for who flies with it, or not any more."""
+        self.ask(waits=waits)

@@ -40,6 +40,8 @@ class Lockstep:
         self._leads = self._take(0)
         self._own = 0 if self._leads else next(place for place in range(1, PLACES) if self._take(place))
         self._time = float(self._places[0])
+        self.waits = True
+        """Whether this one waits for its followers where it leads; otherwise time runs on as for a real aircraft."""
 
     def steps(self, wanted: int, speedup: float) -> int:
         """How many steps of `STEP_S` the vehicles move now, of those that wall time asks for; time moves on by as much
@@ -64,6 +66,8 @@ class Lockstep:
 
     def _slowest(self) -> float:
         """The time of the slowest follower that is waited for."""
+        if not self.waits:
+            return np.inf
         times = [float(self._places[each]) for each in range(1, PLACES) if self._waited_for(each)]
         return min(times, default=np.inf)
 

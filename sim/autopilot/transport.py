@@ -192,6 +192,11 @@ class Driver:
             for autopilot in mock.autopilots:
                 autopilot.firmware.link_floor_s = link_floor_s(speedup)
 
+    def set_waits(self, waits: bool) -> None:
+        """Wait for who flies in lockstep from now on, or not any more; without lockstep it changes nothing."""
+        if self._lockstep is not None:
+            self._lockstep.waits = waits
+
     async def run(self) -> None:
         """Run until cancelled."""
         last, owed, swept = time.monotonic(), 0.0, time.monotonic()

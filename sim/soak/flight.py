@@ -20,6 +20,7 @@ from typing import Any
 import httpx
 import numpy as np
 
+from service.lockstep import Lockstep
 from sim.autopilot.control import Control
 from sim.autopilot.process import AutopilotProcess
 from sim.detector import Detector
@@ -37,7 +38,10 @@ from sim.soak.wing import Wing
 
 _FINAL = {"DONE", "ABORTED"}
 _FLYING = {"SEARCHING", "CONFIRMING"}
-_PATIENCE_S = 90.0  # wall time: what takes longer never ends
+_PATIENCE_S = (
+    90.0  # wall time that a machine with nothing else to do would take: what takes longer never ends
+)
+_SLOWER = 10.0  # so many times as long it may take on one that has
 _COMPILED_S = 400.0  # the first flight on a machine compiles the planner
 _HELP_AFTER_S = 8.0  # vehicle time after which the operator resumes a search that does not go on by itself
 _BAD_WORDS = ("Traceback", "never retrieved", "was destroyed", "never awaited", "Unhandled", "Exception in")
@@ -89,6 +93,7 @@ class SoakFlight:
         self._rng = np.random.default_rng(plan.seed)
         self._finished: list[Eyes] = []
         self._wing: Wing | None = None
+        self._now: Callable[[], float] = time.monotonic
 
     def fly(self) -> Outcome:
         """Fly it; every violation is in the outcome, even that it could not be flown."""
@@ -110,11 +115,13 @@ class SoakFlight:
 
     def _start(self, stack: ExitStack) -> None:
         self.folder.mkdir(parents=True)
+        self._time_kept = self.folder / "time"
         self._clock = SteppedClock(self.folder / "clock")
         lat, lon = ground.launch()
         home = f"--home={lat:.7f},{lon:.7f},{ground.GROUND_AMSL_M:g}"
         options = [home, "--ready-after", "3", "--control", "127.0.0.1:0", "--seed", str(self.plan.seed)]
         options += ["--endurance", f"{ground.ENDURANCE_S / 60.0:g}"]
+        options += ["--lockstep", str(self._time_kept)]
         options += self._odd_from_the_start()
         over: list[str] = []
         if self.plan.hill:
@@ -125,8 +132,14 @@ class SoakFlight:
         mock = stack.enter_context(AutopilotProcess(self.plan.flavor, speedup=self.speedup, options=options))
         assert mock.control is not None
         self._control = stack.enter_context(Control(mock.control))
-        judge = self.judge
-        tap = Tap(mock.port, from_service=judge.from_service, from_autopilot=judge.from_autopilot)
+        judge, lockstep = self.judge, Lockstep(self._time_kept, self.speedup)
+        self._now = lockstep.ticks
+        tap = Tap(
+            mock.port,
+            from_service=judge.from_service,
+            from_autopilot=judge.from_autopilot,
+            lockstep=lockstep,
+        )
         self._tap = stack.enter_context(tap)
         if self.plan.aircraft > 1:
             self._wing = Wing(
@@ -135,6 +148,7 @@ class SoakFlight:
                 speedup=self.speedup,
                 seed=self.plan.seed,
                 control=mock.control,
+                lockstep=self._time_kept,
                 over=over,
             )
         area, settings = self.folder / "area.geojson", self.folder / "settings.toml"
@@ -160,7 +174,13 @@ class SoakFlight:
 
     def _launch(self, words: list[str]) -> None:
         words = [*words, "--http", "127.0.0.1:0", "--speedup", f"{self.speedup:g}"]
-        self._service = Process(["sim.soak.clocked", *words], {clocked.CLOCK_FILE: str(self._clock.path)})
+        self._service = Process(
+            ["sim.soak.clocked", *words],
+            {
+                clocked.CLOCK_FILE: str(self._clock.path),
+                "ROISEARCH_LINK_LOCKSTEP": str(self._time_kept),
+            },
+        )
         self._url = self._service.wait_for(r"listening on (http://\S+)", _COMPILED_S).group(1)
         pid = self._service.process.pid
         own_clock = self.speedup == 1.0
@@ -209,7 +229,7 @@ class SoakFlight:
         self.judge.during = ""
         if moment == HOLD:
             self._order("hold")
-            self.judge.stopped(time.monotonic(), OPERATOR)
+            self.judge.stopped(self._now(), OPERATOR)
             self._pass(3.0)
         elif moment == HOME:
             self._order("return")
@@ -217,9 +237,9 @@ class SoakFlight:
 
     def _take_off(self) -> None:
         """The search begins; an operator helps where a person or the autopilot stands in the way."""
-        began = helped = time.monotonic()
+        began = helped = self._now()
         while (state := self._state()) not in _FLYING:
-            now = time.monotonic()
+            now = self._now()
             if now - began > _PATIENCE_S or self._service.process.poll() is not None:
                 raise Trouble(f"the search has not begun, but is {state}")
             if state in ("HOLDING", "YIELDED", "READY") and (now - helped) * self.speedup > _HELP_AFTER_S * 4:
@@ -229,7 +249,7 @@ class SoakFlight:
 
     def _stay_down(self, words: str) -> None:
         """The service ends the run on the ground, and says why."""
-        code = self._service.exit_code(_PATIENCE_S)
+        code = self._service.exit_code(_SLOWER * _PATIENCE_S)
         self._look_away()
         self.outcome.ended = "grounded"
         if code != 4 or words not in " ".join(self._service.said.split()):
@@ -253,11 +273,13 @@ class SoakFlight:
             self._pass(fault.seconds)
             eyes.lies = ""
         elif kind == "stall":
+            self._control.waits(False)
             self._service.process.send_signal(signal.SIGSTOP)
             if self._rng.random() < 0.5:  # what happens while nobody looks
                 self._control.fault("pilot")
             time.sleep(options["wall_s"])
             self._service.process.send_signal(signal.SIGCONT)
+            self._control.waits(True)
         elif kind == "hangup":
             self._service.process.send_signal(signal.SIGHUP)  # the terminal is gone, and the flight goes on
             self._pass(fault.seconds)
@@ -277,7 +299,7 @@ class SoakFlight:
             self._lock_the_journal(fault.seconds)
         elif kind == "operator_holds":
             self._order("hold")
-            self.judge.stopped(time.monotonic(), OPERATOR)
+            self.judge.stopped(self._now(), OPERATOR)
             self._pass(fault.seconds)
         else:
             self._let_the_mock(fault)
@@ -288,7 +310,7 @@ class SoakFlight:
         properties = {"role": role, **fault.options}
         told = self._post("/api/news", {"type": "Feature", "properties": properties, "geometry": shape})
         if role == "exclude":
-            self.judge.excluded(time.monotonic())
+            self.judge.excluded(self._now())
         self._pass(fault.seconds)
         self.judge.excluded(math.inf)
         if told is not None:
@@ -310,7 +332,7 @@ class SoakFlight:
             self._pass(3.0)
         self._control.fault(name, **fault.options)
         if by := KINDS[fault.kind].stops:
-            self.judge.stopped(time.monotonic(), by)
+            self.judge.stopped(self._now(), by)
         self._pass(fault.seconds)
         if name != "battery":
             self._control.clear(name)
@@ -319,12 +341,12 @@ class SoakFlight:
         """A person has stopped the aircraft when the service dies: the next one leaves it so."""
         if held:
             self._order("hold")
-            self.judge.stopped(time.monotonic(), OPERATOR)
+            self.judge.stopped(self._now(), OPERATOR)
         else:
             self._control.fault("pilot")
             self._pass(4.0)
             self._control.clear("pilot")
-            self.judge.stopped(time.monotonic(), KINDS["killed_while_yielded"].stops)
+            self.judge.stopped(self._now(), KINDS["killed_while_yielded"].stops)
         self._pass(3.0)
         self._kill()
         self._pass(seconds)
@@ -338,12 +360,10 @@ class SoakFlight:
             raise Trouble("there is no run to go on with")
         self.judge.started_over()
         if not self.judge.is_stopped:
-            self.judge.ordered(time.monotonic())  # --resume is an order to go on
-        self._control.ask(
-            speedup=1.0
-        )  # a computer that starts does so in its own time, and the battery is small
+            self.judge.ordered(self._now())  # --resume is an order to go on
+        self._control.speedup(1.0)  # a computer that starts does so in its own time, and the battery is small
         self._launch(["--resume", str(self._alive_runs()[0])])
-        self._control.ask(speedup=self.speedup)
+        self._control.speedup(self.speedup)
 
     def _alive_runs(self) -> list[Path]:
         return sorted(self._runs.glob("*"))
@@ -351,33 +371,35 @@ class SoakFlight:
     def _recover(self) -> None:
         """Wait until the search goes on or has ended; an operator helps where it does not by itself."""
         self._pass(_HELP_AFTER_S / 2)
-        began, helped = time.monotonic(), 0
+        began, helped = self._now(), 0
         while (state := self._state()) not in _FLYING | _FINAL | {"FOUND"}:
-            waited = (time.monotonic() - began) * self.speedup
+            waited = (self._now() - began) * self.speedup
             if state in ("HOLDING", "YIELDED") and waited > _HELP_AFTER_S * (helped + 1):
                 self._control.clear(None)
-                self._order("resume" if self._rng.random() < 0.9 else "return")
+                # the second time by name: an order for all takes none from its pilot
+                self._order("resume" if self._rng.random() < 0.9 else "return", first=helped % 2 == 1)
                 helped += 1
-                if self._wing is not None and helped >= 3:
-                    self._order("finish")  # one is left that an order for all does not take from its pilot
-            if time.monotonic() - began > _PATIENCE_S:
+                if self._wing is not None and helped >= 6:
+                    self._order("finish")  # another one is left that its pilot has
+            if self._now() - began > _PATIENCE_S:
                 raise Trouble(f"still {state} after {_PATIENCE_S:.0f} s")
             time.sleep(0.1)
 
     def _go_home(self) -> None:
         """The operator ends the search; the run must end with the aircraft on the ground, and the process with it."""
         self._control.clear(None)
-        began = last = -np.inf
-        began = time.monotonic()
+        began, last, asked = self._now(), -np.inf, 0
         while self._service.process.poll() is None and self._state() not in _FINAL:
-            if self._state() in (*_FLYING, "FOUND", "HOLDING", "YIELDED") and time.monotonic() - last > 3.0:
-                last = time.monotonic()
-                self._order("return" if self._wing is None or last - began < 20.0 else "finish")
-            if time.monotonic() - began > _PATIENCE_S:
+            if self._state() in (*_FLYING, "FOUND", "HOLDING", "YIELDED") and self._now() - last > 3.0:
+                last = self._now()
+                late = self._wing is not None and last - began > 20.0
+                self._order("finish" if late else "return", first=asked % 2 == 1)
+                asked += 1
+            if self._now() - began > _PATIENCE_S:
                 raise Trouble(f"not home but {self._state()} after {_PATIENCE_S:.0f} s")
             time.sleep(0.1)
         self._look_away()
-        code = self._service.exit_code(_PATIENCE_S)
+        code = self._service.exit_code(_SLOWER * _PATIENCE_S)
         if code not in (0, 3, 4):
             raise Trouble(f"the service has ended with exit code {code}")
         self.outcome.ended = {0: "found", 3: "not found", 4: "aborted"}[code]
@@ -399,10 +421,10 @@ class SoakFlight:
 
     def _order(self, command: str, *, first: bool = False) -> None:
         """Order it of all, or of the `first` alone, whom the faults befall: no order for all takes it from a pilot."""
-        self.judge.ordered(time.monotonic())
+        self.judge.ordered(self._now())
         named = {"aircraft": "1"} if first and self._wing is not None else {}
         self._post("/api/commands", {"command": command, **named}, refused=True)
-        self.judge.ordered(time.monotonic())
+        self.judge.ordered(self._now())
 
     def _post(self, path: str, body: dict[str, Any], *, refused: bool = False) -> Any:
         """What the door answers; None when the run has ended. `refused`: it may refuse, which is an answer, too."""
@@ -433,13 +455,13 @@ class SoakFlight:
         )  # in flight a reboot is the end of it
         self.outcome.seconds = state["time"]
         here = (state["latitude"], state["longitude"])
-        self.judge.truth(state["above_ground"], here, time.monotonic(), crashed=crashed)
+        self.judge.truth(state["above_ground"], here, self._now(), crashed=crashed)
         return state
 
     def _until(self, condition: Callable[[], bool], complaint: str) -> None:
-        deadline = time.monotonic() + _PATIENCE_S
+        deadline = self._now() + _PATIENCE_S
         while not condition():
-            if time.monotonic() > deadline or self._service.process.poll() is not None:
+            if self._now() > deadline or self._service.process.poll() is not None:
                 raise Trouble(complaint)
             time.sleep(0.1)
 

@@ -19,7 +19,7 @@ from sim.soak import ground
 from sim.soak.tap import is_probe, motion_name
 
 _STATE = re.compile(r"search ([A-Z]+):")
-_SLACK_S = 0.6  # frames cross on the wire, and this process may have to wait for a processor
+_SLACK_S = 0.1  # frames cross on the wire
 _POSITIONS = 12
 _ORDER_S = 15.0
 _DRAIN = 1.3 * 100.0 / ground.ENDURANCE_S  # percent a second that flying takes at most

@@ -12,6 +12,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from service.lockstep import Lockstep
+
 HARMLESS = {
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
     mavlink.MAV_CMD_REQUEST_MESSAGE,
@@ -43,6 +45,7 @@ class Tap:
     Args:
         autopilot_port: the UDP port of the mock autopilot.
         from_service, from_autopilot: told every message with the time (monotonic) before it is carried on.
+        lockstep: with a simulated time that waits for what is on the wire, by which times are told then.
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class Tap:
         *,
         from_service: Listener | None = None,
         from_autopilot: Listener | None = None,
+        lockstep: Lockstep | None = None,
     ) -> None:
         self._to = ("127.0.0.1", autopilot_port)
         self._front, self._back = self._socket(), self._socket()
@@ -59,6 +63,8 @@ class Tap:
         self.texts: list[str] = []
         self.beats = 0
         self._from_service, self._from_autopilot = from_service, from_autopilot
+        self._lockstep = lockstep
+        self._now = time.monotonic if lockstep is None else lockstep.ticks
         self._parser, self._back_parser = self._robust(), self._robust()
         self._writer = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._service: Any = None
@@ -86,6 +92,8 @@ class Tap:
     ) -> None:
         self._open = False
         self._thread.join()
+        if self._lockstep is not None:
+            self._lockstep.leave()
         self._front.close()
         self._back.close()
 
@@ -99,8 +107,11 @@ class Tap:
             self._front.sendto(data, self._service)
 
     def _carry(self) -> None:
+        patience_s = 0.05 if self._lockstep is None else 0.002
         while self._open:
-            ready, _, _ = select.select([self._front, self._back], [], [], 0.05)
+            if self._lockstep is not None:
+                self._lockstep.content_for(0.0)
+            ready, _, _ = select.select([self._front, self._back], [], [], patience_s)
             if self._front in ready:
                 try:
                     data, self._service = self._front.recvfrom(4096)
@@ -114,14 +125,14 @@ class Tap:
                 except ConnectionError:  # the mock is gone
                     continue
                 if self._from_autopilot is not None:
-                    now = time.monotonic()
+                    now = self._now()
                     for message in self._back_parser.parse_buffer(data) or []:
                         self._from_autopilot(message, now)
                 if self._service is not None:
                     self._front.sendto(data, self._service)
 
     def _note(self, data: bytes) -> None:
-        now = time.monotonic()
+        now = self._now()
         for message in self._parser.parse_buffer(data) or []:
             if message.get_type() == "HEARTBEAT":
                 self.beats += 1

@@ -7,6 +7,7 @@ that all are on the ground in the end.
 from __future__ import annotations
 
 from contextlib import ExitStack
+from pathlib import Path
 
 from sim.autopilot.process import AutopilotProcess
 from sim.separation import Separation, Watching, side_by_side
@@ -23,13 +24,22 @@ class Wing:
     Args:
         stack: what ends them.
         control: the control socket of the first.
+        lockstep: where the first keeps its time.
         over: the mocks' words for the ground below.
     """
 
     def __init__(
-        self, number: int, stack: ExitStack, *, speedup: float, seed: int, control: str, over: list[str]
+        self,
+        number: int,
+        stack: ExitStack,
+        *,
+        speedup: float,
+        seed: int,
+        control: str,
+        lockstep: Path,
+        over: list[str],
     ) -> None:
-        self._stack, self._seed = stack, seed
+        self._stack, self._seed, self._lockstep = stack, seed, lockstep
         self.judge = Separation()
         self.names = [str(each) for each in range(2, number + 1)]
         self._detectors: list[Process] = []
@@ -42,6 +52,8 @@ class Wing:
                 str(seed + int(name)),
                 "--endurance",
                 f"{ground.ENDURANCE_S / 60.0:g}",
+                "--lockstep",
+                str(lockstep),
                 *over,
             ]
             flavor = FLAVORS[(seed + int(name)) % len(FLAVORS)]
@@ -56,7 +68,8 @@ class Wing:
         self.look_away()
         for name in self.names:
             words = ["sim", "detector", "--attached", "--service", url, "--aircraft", name, "--p-tn", "0.97"]
-            self._detectors.append(Process([*words, "--seed", str(self._seed + int(name))]))
+            words += ["--seed", str(self._seed + int(name)), "--lockstep", str(self._lockstep)]
+            self._detectors.append(Process(words))
 
     def look_away(self) -> None:
         """The service that they reported to is gone."""

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from service.mavlink.errors import NotPermitted
 from service.mavlink.events import AnotherService, ModeChanged, TargetNotTaken, TargetReplaced
 
-from .peer import ALT, FLAVORS, LAT, LON, NORTH, REPOSITION, RETURN, Peer, Rig, go
+from .peer import ALT, FLAVORS, GUIDED, LAT, LON, NORTH, PILOT, REPOSITION, RETURN, Peer, Rig, go
 
 
 def searching(flavor: str) -> Rig:
@@ -55,6 +55,28 @@ def test_a_target_of_somebody_else_is_noticed_while_none_of_ours_is_under_way(fl
     rig.run(2.0)
     (replaced,) = rig.of(TargetReplaced)
     assert replaced.target is None
+
+
+@FLAVORS
+def test_a_target_of_somebody_else_is_noticed_as_soon_as_the_mode_that_we_asked_for_is_there(
+    flavor: str,
+) -> None:
+    """Not only after the time for which that mode might have been on its way."""
+    rig = Rig(flavor).flying()
+    rig.peer.mode = PILOT[flavor]
+    rig.run(1.5)
+    rig.core.request(rig.autopilot.set_mode(GUIDED[flavor]), rig.now, ordered=True)
+    rig.run(0.3)
+    rig.peer.mode = GUIDED[flavor]
+    rig.run(1.2)
+    rig.core.take_control(rig.now)
+    go(rig)
+    rig.peer.target = (NORTH, LON, ALT)
+    rig.run(1.0)
+    rig.peer.target = (LAT - 0.001, LON, ALT)
+    rig.run(1.5)
+    assert len(rig.of(TargetReplaced)) == 1
+    assert not rig.core.in_control
 
 
 @FLAVORS

@@ -11,6 +11,7 @@ from sim.autopilot.control import Control, answer
 from sim.autopilot.dialect import M
 from sim.autopilot.faults import Fault
 from sim.autopilot.settings import Settings
+from sim.autopilot.transport import Driver
 from tests.fixtures_autopilot import StartAutopilot, flavor, start_autopilot
 from tests.sim.autopilot.hovering import Flight, flight
 
@@ -33,6 +34,8 @@ def test_tells_the_state_and_takes_faults(start_autopilot: StartAutopilot, flavo
         assert control.state()["faults"] == []
         with pytest.raises(ValueError, match="no fault of kind"):
             control.fault("gremlins")
+        with pytest.raises(ValueError, match="waits is true or false"):
+            control.ask(waits="perhaps")
         with pytest.raises(ValueError, match="no 'dance'"):
             control.ask(dance=True)
 
@@ -65,7 +68,7 @@ def test_a_vehicle_in_the_air_is_not_replaced(flight: Flight) -> None:
 )  # fmt: skip
 def test_a_replacement_that_there_is_not_is_refused(words: object, wrong: str) -> None:
     flight = Flight("px4", hovers=False)
-    reply = answer(flight.autopilot, json.dumps({"replace": words}).encode(), lambda factor: None)
+    reply = answer(flight.autopilot, json.dumps({"replace": words}).encode(), Driver([], 1.0))
     assert wrong in reply["error"]
 
 

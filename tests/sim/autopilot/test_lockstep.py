@@ -18,6 +18,7 @@ from service.clock import Clock
 from service.errors import BadInput
 from sim.autopilot.lockstep import AHEAD_WALL_S
 from sim.autopilot.settings import STEP_S
+from sim.autopilot.transport import Driver
 
 SPEEDUP = 20.0
 AHEAD_STEPS = int(AHEAD_WALL_S * SPEEDUP / STEP_S)
@@ -75,6 +76,18 @@ def leader(folder: Path) -> tuple[sim.autopilot.lockstep.Lockstep, Path]:
 def test_who_leads_alone_is_never_held(tmp_path: Path) -> None:
     lead, _ = leader(tmp_path)
     assert [lead.steps(count, SPEEDUP) for count in (1, 500, 0, 7)] == [1, 500, 0, 7]
+
+
+def test_time_runs_on_while_it_is_told_to_wait_for_nobody(tmp_path: Path) -> None:
+    lead, file = leader(tmp_path)
+    lead.steps(100, SPEEDUP)
+    driver = Driver([], SPEEDUP, lead)
+    with following(file) as follower:
+        follower.act()
+        driver.set_waits(False)
+        assert lead.steps(500, SPEEDUP) == 500
+        driver.set_waits(True)
+        assert lead.steps(500, SPEEDUP) == 0
 
 
 def test_time_waits_for_who_follows_and_goes_on_with_it(tmp_path: Path) -> None:

@@ -55,6 +55,13 @@ def ordered(order: Order, look: Look) -> Iterator[Wish]:
         yield Hold("operator", ASKED)  # it is at home: a flag must not fly it after that
         yield Answer(order.ticket)
         return
+    if order.command in ("return", "finish") and _left_aloft(look):
+        finish = order.command == "finish"
+        why = FINISHED if finish else "the operator asked to return"
+        home = Happen(Event.HOMEWARD, ASKED, stopped=why, searched=finish)
+        then = (home, Settle(why)) if finish else (home,)
+        yield Pending(order.command, EnterGuided(), then, order.ticket)
+        return
     if why := _refusal(order.command, look):
         if order.command in STOPPING and look.ordered:  # that is what it was to stop
             yield Answer(order.ticket)
@@ -107,22 +114,18 @@ def ordered(order: Order, look: Look) -> Iterator[Wish]:
 
 def sensible(look: Look) -> list[str]:
     """The orders that would change something now. What else may be against one is told to whoever gives it."""
-    state, down = look.standing.state, on_ground(look.seen.telemetry)
+    state = look.standing.state
     stops = ["hold"] if look.ordered else []  # a launch that gets ready
     if state == State.WAITING:
         stops = ["hold", "return"]
-    return [
-        each
-        for each in OFFERED
-        if each in stops or not (_senseless(each, state, down) or _is_so(each, state))
-    ]
+    return [each for each in OFFERED if each in stops or not (_senseless(each, look) or _is_so(each, state))]
 
 
 def concerned(command: str, look: Look) -> bool:
     """Whether an order means something now, be it that it is carried out already; whether it may be is another
     question."""
     stops = command in STOPPING and bool(look.ordered)
-    return stops or not _senseless(command, look.standing.state, on_ground(look.seen.telemetry))
+    return stops or not _senseless(command, look)
 
 
 def _is_so(command: str, state: State) -> bool:
@@ -158,7 +161,7 @@ def judged(word: Judged, look: Look) -> Iterator[Wish]:
 def _refusal(command: str, look: Look) -> str:
     """Why an order cannot be obeyed now, for the person who gave it, or nothing."""
     t = look.seen.telemetry
-    if why := _senseless(command, look.standing.state, on_ground(t)):
+    if why := _senseless(command, look):
         return why
     yielded = look.standing.state == State.YIELDED
     takes = command in _TAKES if yielded else command == "resume" and look.standing.state == State.HOLDING
@@ -173,9 +176,17 @@ def _refusal(command: str, look: Look) -> str:
     return ""
 
 
-def _senseless(command: str, state: State, down: bool) -> str:
-    """Why an order means nothing in a state, to an aircraft that stands on the ground with its motors off or does not;
-    or nothing."""
+def _left_aloft(look: Look) -> bool:
+    """An earlier process has left the aircraft in the air, in the guided mode, and it is not in our hands yet."""
+    t = look.seen.telemetry
+    return look.standing.state == State.READY and look.flight.flown and t.guided and not on_ground(t)
+
+
+def _senseless(command: str, look: Look) -> str:
+    """Why an order means nothing to the aircraft as it is; or nothing."""
+    state, down = look.standing.state, on_ground(look.seen.telemetry)
+    if command == "return" and _left_aloft(look):
+        return ""
     if command in _EVENTS and state not in _SO_ALREADY[command] and (state, _EVENTS[command]) not in TABLE:
         return f"there is nothing to {command} in {state}"
     if command == "resume" and state in (State.YIELDED, State.HOLDING) and down:

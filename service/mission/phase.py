@@ -151,7 +151,7 @@ class Pending:
 
     command: str
     action: Action
-    then: tuple[Happen | Hold, ...]
+    then: tuple[Happen | Hold | Settle, ...]
     ticket: int
 
 

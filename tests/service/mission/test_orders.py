@@ -157,6 +157,29 @@ def test_ending_the_process_says_nothing_about_the_search() -> None:
     assert SIGNAL != ASKED  # which is what a run that is over is known by
 
 
+@pytest.mark.parametrize("command", ["return", "finish"])
+def test_what_an_earlier_process_left_in_the_air_is_brought_home_before_it_is_in_hand(command: str) -> None:
+    """And is not left hovering there, which is what the end of a run that has not begun would be."""
+    talk = reached(State.READY, in_control=False)
+    talk.core.flight.flown = True
+    assert command in talk.core.orders(talk.seen)
+    talk.on(Order(command, 7))
+    assert (talk.state, talk.doing()) == (State.READY, EnterGuided())
+    talk.shows(in_control=True)
+    assert Answer(7) in talk.done()
+    assert talk.state == State.RETURNING
+    assert talk.core.standing.settled == (command == "finish")
+    assert talk.core.standing.why_stopped
+
+
+@pytest.mark.parametrize("changes", [ON_GROUND, LEFT_US], ids=["on the ground", "its pilot has it"])
+def test_what_is_finished_before_it_is_in_hand_is_left_alone_elsewhere(changes: dict[str, Any]) -> None:
+    talk = reached(State.READY, **changes)
+    talk.core.flight.flown = True
+    talk.on(Order("finish", 7))
+    assert (talk.state, talk.core.doing) == (State.DONE, None)
+
+
 @pytest.mark.parametrize("changes", [{}, ON_GROUND], ids=["in the air", "on the ground"])
 @pytest.mark.parametrize("state", list(State))
 def test_what_is_offered_is_what_is_not_refused_as_meaning_nothing(

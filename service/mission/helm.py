@@ -29,6 +29,7 @@ from service.mission.limits import (
     reference_objection,
     wind_objection,
 )
+from service.mission.situation import on_ground
 from service.mission.traffic import Traffic
 
 WINDY_S = 5.0
@@ -133,8 +134,12 @@ class Helm:
         return ""
 
     def _from_launch_m(self, t: Telemetry) -> float:
-        """Metres between home and the launch point, on the ellipsoid: the plane of the grid ends near the area."""
-        (lat, lon), (lat2, lon2) = self._chart.grid.launch, self._chart.home(t)
+        """Metres between home and the launch point, on the ellipsoid: the plane of the grid ends near the area.
+
+        A home that is not told is where the aircraft stands before its flight.
+        """
+        stands = t.home is None and t.position_known and on_ground(t)
+        (lat, lon), (lat2, lon2) = self._chart.grid.launch, here(t) if stands else self._chart.home(t)
         return distance_m(Target(lat, lon, 0.0), Target(lat2, lon2, 0.0))
 
     def return_m(self, t: Telemetry) -> float:

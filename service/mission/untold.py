@@ -1,4 +1,4 @@
-"""What nobody tells, and a person must know for that: the level of the battery, and the wind."""
+"""What nobody tells, and a person must know for that: the level of the battery, home, and the wind."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from service.mission.situation import on_ground
 from service.mission.standing import Look
 
 BATTERY_S = 15.0  # after so long in the air a battery that was not told yet is one that is not told
+HOME_S = 15.0  # home is asked for every two seconds, and set anew with the arming
 WIND_S = 60.0  # after so long in the air the wind is told, or has been reckoned
 _WARNING = 4  # MAV_SEVERITY
 
@@ -22,16 +23,22 @@ class Untold:
     def __init__(self) -> None:
         self.battery = ""
         """What is reckoned of the battery's level, or nothing while that is told."""
-        self._wind_said = False
+        self._wind_said = self._home_said = False
 
     def tick(self, look: Look, wind: Wind | None) -> Iterator[Wish]:
         """Look at the battery's level, and at the wind as it is told or reckoned (None: not known)."""
         if not on_ground(look.seen.telemetry):
             doubt = look.energy.warning() if look.flight.aloft_s(look.now) > BATTERY_S else ""
             if doubt and not self.battery:
-                yield Note(doubt, logging.WARNING)
-                yield Tell(f"search: {doubt}", _WARNING)
+                yield from self._say(doubt)
             self.battery = doubt
+        if (
+            look.seen.telemetry.home is None
+            and not self._home_said
+            and look.flight.aloft_s(look.now) > HOME_S
+        ):
+            self._home_said = True
+            yield from self._say("home is not told: the launch point of the area is taken for it")
         if not look.standing.flying:
             return
         self._wind_said &= wind is None
@@ -40,3 +47,8 @@ class Untold:
             said = "the wind is not known, neither told nor reckoned from the lean: max_wind_mps does nothing"
             yield Note(said, logging.WARNING)
             yield Tell("search: wind is not known, look at it yourself", _WARNING)
+
+    @staticmethod
+    def _say(what: str) -> Iterator[Wish]:
+        yield Note(what, logging.WARNING)
+        yield Tell(f"search: {what}", _WARNING)

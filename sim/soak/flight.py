@@ -236,9 +236,11 @@ class SoakFlight:
             self._pass(2.0)
 
     def _take_off(self) -> None:
-        """The search begins; an operator helps where a person or the autopilot stands in the way."""
+        """The search begins; an operator helps where a person or the autopilot stands in the way. What a pilot took
+        before it began may be on the ground again before the operator comes."""
         began = helped = self._now()
-        while (state := self._state()) not in _FLYING:
+        over = set[str]() if self.plan.at_boot == "none" else _FINAL
+        while (state := self._state()) not in _FLYING | over:
             now = self._now()
             if now - began > _PATIENCE_S or self._service.process.poll() is not None:
                 raise Trouble(f"the search has not begun, but is {state}")

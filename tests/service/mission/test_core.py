@@ -251,6 +251,14 @@ def test_a_battery_that_is_not_told_any_longer_is_counted_down_and_told_once() -
     assert [each for each in talk.pass_by(10.0) if isinstance(each, Tell) and "battery" in each.text]
 
 
+def test_a_home_that_is_not_told_is_said_once() -> None:
+    talk = searching()
+    talk.shows(home=None)
+    did = talk.pass_by(60.0)
+    said = "search: home is not told: the launch point of the area is taken for it"
+    assert [each.text for each in did if isinstance(each, Tell)].count(said) == 1
+
+
 def test_a_wind_that_is_neither_told_nor_reckoned_is_said_once() -> None:
     talk = searching()
     talk.shows(wind=Wind(1.0, 0.0))

@@ -18,7 +18,7 @@ from service.mission.chart import Chart
 from service.mission.effects import SendWaypoint
 from service.mission.helm import Helm
 from sim.soak import ground
-from tests.service.mission.flown import GRID, START, place, telemetry
+from tests.service.mission.flown import GRID, ON_GROUND, START, place, telemetry
 
 
 def helm(grid: Grid = GRID, **flight: Any) -> Helm:
@@ -126,6 +126,14 @@ def test_a_home_far_from_the_launch_point_is_refused_and_one_beside_it_told() ->
     assert (built.too_far(beside), built.far(beside)) == ("", "home is 111 m from the launch point")
     away = telemetry(home=Home(-lat, lon - 170.0, 400.0))
     assert "more than 500 m; is it the right area file?" in built.too_far(away)
+
+
+def test_an_aircraft_whose_home_is_not_told_stands_where_home_will_be() -> None:
+    built, (lat, lon) = helm(), ground.launch()
+    untold = telemetry(home=None, lat=lat, lon=lon, **ON_GROUND)
+    assert built.too_far(untold) == built.far(untold) == ""
+    assert "more than 500 m" in built.too_far(replace(untold, lat=lat + 1.0, lon=lon))
+    assert built.too_far(telemetry(home=None, lat=lat + 1.0, lon=lon)) == ""  # in the air it may be anywhere
 
 
 def test_nothing_takes_off_or_is_taken_over_whose_home_lies_in_an_exclusion() -> None:

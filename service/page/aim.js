@@ -14,8 +14,12 @@ export function aimByKeys(map, onMove, onEscape) {
     map.panBy(stride, { animate: false });
     point("mousemove");
   };
+  const escape = () => {
+    onEscape();
+    map.fire("escape");
+  };
   /** @type {Record<string, () => void>} */
-  const keys = { Enter: () => point("click"), " ": () => point("click"), Escape: onEscape };
+  const keys = { Enter: () => point("click"), " ": () => point("click"), Escape: escape };
   const key = (/** @type {any} */ event) => {
     if (event.target !== container) return;
     const stride = strideOf(event);

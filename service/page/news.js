@@ -4,6 +4,7 @@ import { inWords } from "./cursor.js";
 import { $, make, say } from "./dom.js";
 import { ask } from "./link.js";
 import { tell } from "./orders.js";
+import { Sketch } from "./sketch.js";
 
 const CORNERS = 32;
 const METRES_PER_DEGREE = 111195;
@@ -22,6 +23,14 @@ const METRES = {
 
 /** @typedef {keyof typeof ROLES} Role */
 
+/** What is drawn for the form. @type {Sketch | null} */
+let sketch = null;
+/** Whether the map was asked for, and the form is gone on with afterwards. */
+let placing = false;
+
+/** Whether corners are set, and not one place. */
+const outlined = () => $("news-shape").value !== "around" && $("news-role").value !== "refute";
+
 /** A circle as a GeoJSON ring, longitude first.
  * @param {number} lat
  * @param {number} lon
@@ -35,32 +44,35 @@ function ring(lat, lon, metres) {
   });
 }
 
-/** What the form says, as the service takes it. */
-function feature() {
+/** Where it is: what is drawn, a circle, or the place itself.
+ * @param {boolean} flat whether ground is meant, with a border */
+function geometry(flat) {
+  if (outlined()) return /** @type {Sketch} */ (sketch).geometry();
   const [lat, lon, metres] = ["news-lat", "news-lon", "news-metres"].map((id) =>
     Number($(id).value),
   );
+  return flat
+    ? { type: "Polygon", coordinates: [ring(lat, lon, metres)] }
+    : { type: "Point", coordinates: [lon, lat] };
+}
+
+/** What the form says, as the service takes it. */
+function feature() {
   const words = $("news-words").value.trim();
   const role = $("news-role").value;
   if (role === "refute") {
     const properties = { role, prior: $("news-prior").value, words };
     return { type: "Feature", geometry: null, properties };
   }
-  if (role !== "clue") {
-    const geometry = { type: "Polygon", coordinates: [ring(lat, lon, metres)] };
-    const pod = role === "searched" ? { pod: Number($("news-pod").value) } : {};
-    return { type: "Feature", geometry, properties: { role, ...pod, words } };
-  }
-  return {
-    type: "Feature",
-    geometry: { type: "Point", coordinates: [lon, lat] },
-    properties: {
-      role: "clue",
-      bayes_factor: Number($("news-factor").value),
-      sigma_m: metres,
-      words,
-    },
-  };
+  const said = {
+    clue: { bayes_factor: Number($("news-factor").value) },
+    searched: { pod: Number($("news-pod").value) },
+    exclude: {},
+  }[/** @type {Exclude<Role, "refute">} */ (role)];
+  const fades = role === "clue" && $("news-shape").value !== "ground"; // with the distance from it
+  const sigma = fades ? { sigma_m: Number($("news-metres").value) } : {};
+  const properties = { role, ...said, ...sigma, words };
+  return { type: "Feature", geometry: geometry(role !== "clue"), properties };
 }
 
 /** @param {string} path
@@ -127,14 +139,18 @@ function item(told, mayOrder) {
   return make("li", {}, ...parts);
 }
 
-/** Whether the map was asked for, and the form is gone on with afterwards. */
-let placing = false;
-
-/** Let a click on the map fill the form in while it is open.
+/** Let clicks on the map fill the form in while it is open: the place, or corner after corner.
  * @param {any} map */
 export function placeByClick(map) {
+  sketch?.set([]);
+  sketch = new Sketch(map);
+  map.on("escape", () => {
+    if (placing) $("news-words").focus();
+    placing = false;
+  });
   map.on("click", async (/** @type {{ latlng: { lat: number, lng: number } }} */ { latlng }) => {
     if (!$("news-form").open) return;
+    if (outlined()) return void setCorners([...(sketch?.corners ?? []), latlng]);
     $("news-lat").value = latlng.lat.toFixed(6);
     $("news-lon").value = latlng.lng.toFixed(6);
     if (!placing) return;
@@ -144,25 +160,41 @@ export function placeByClick(map) {
   });
 }
 
+/** @param {any[]} corners */
+function setCorners(corners) {
+  sketch?.set(corners);
+  showFields();
+}
+
 function showFields() {
+  const shape = $("news-shape"),
+    way = shape.querySelector("[value=way]");
   /** @type {Role} */
   const role = $("news-role").value;
-  const placed = ["clue", "searched", "exclude"];
-  /** @type {[string, string[]][]} */
+  way.hidden = way.disabled = role !== "clue";
+  if (way.disabled && shape.value === "way") shape.value = "ground";
+  const refuted = role === "refute",
+    drawn = outlined();
+  /** @type {[string, boolean][]} */
   const fields = [
-    ["news-prior", ["refute"]],
-    ["news-lat", placed],
-    ["news-lon", placed],
-    ["news-metres", placed],
-    ["news-factor", ["clue"]],
-    ["news-pod", ["searched"]],
+    ["news-prior", refuted],
+    ["news-shape", !refuted],
+    ["news-lat", !refuted && !drawn],
+    ["news-lon", !refuted && !drawn],
+    ["news-metres", !refuted && (!drawn || shape.value === "way")],
+    ["news-factor", role === "clue"],
+    ["news-pod", role === "searched"],
   ];
-  for (const [id, of] of fields) {
-    $(id).closest("label").hidden = !of.includes(role);
-    $(id).disabled = !of.includes(role);
+  for (const [id, wanted] of fields) {
+    $(id).closest("label").hidden = !wanted;
+    $(id).disabled = !wanted;
   }
-  $("news-place").hidden = !placed.includes(role);
-  $("news-by-click").hidden = !placed.includes(role);
+  if (drawn) sketch?.as(shape.value);
+  else sketch?.set([]);
+  $("news-place").hidden = $("news-by-click").hidden = refuted;
+  $("news-back").hidden = !drawn || !sketch?.corners.length;
+  const set = `Each click on the map sets a corner; ${sketch?.words() ?? "none"} so far.`;
+  say($("news-by-click"), drawn ? set : "A click on the map fills these in.");
   say($("news-metres-name"), METRES[role]);
 }
 
@@ -170,15 +202,28 @@ $("news-place").addEventListener("click", (/** @type {MouseEvent} */ { detail })
   placing = true;
   tell(
     detail
-      ? "Click the place on the map"
-      : "Arrow keys move the map; Enter takes the place under the cross-hair",
+      ? outlined()
+        ? "Click corner after corner on the map"
+        : "Click the place on the map"
+      : outlined()
+        ? "Arrow keys move the map; Enter sets a corner under the cross-hair, Escape ends"
+        : "Arrow keys move the map; Enter takes the place under the cross-hair",
   );
   $("map").scrollIntoView({ block: "center" }); // on a phone the form lies below the map
   if (!detail) $("map").focus();
 });
-$("news-role").addEventListener("change", showFields);
+$("news-back").addEventListener("click", () => {
+  setCorners(sketch?.corners.slice(0, -1) ?? []);
+  if ($("news-back").hidden) $("news-place").focus();
+});
+for (const id of ["news-role", "news-shape"]) $(id).addEventListener("change", showFields);
+$("news-form").addEventListener("toggle", () => $("news-form").open || setCorners([]));
 $("news-entry").addEventListener("submit", async (/** @type {Event} */ event) => {
   event.preventDefault();
-  await say_of(() => post("/api/news", feature()));
+  await say_of(async () => {
+    const answer = await post("/api/news", feature());
+    setCorners([]);
+    return answer;
+  });
 });
 showFields();

@@ -336,6 +336,31 @@ def test_news_get_their_place_by_keys_alone(keys: Keyboard, search: Served) -> N
     expect(coordinates_of(keys.watch)).to_have_text(", ".join(taken))
 
 
+def test_a_way_is_drawn_for_news_by_keys_alone(keys: Keyboard, search: Served) -> None:
+    page, press = keys.page, keys.page.keyboard.press
+    keys.press(page.get_by_text("Tell news"))
+    keys.reach(page.get_by_label("Shape"))
+    press("End")
+    expect(page.get_by_label("Shape")).to_have_value("way")
+    keys.press(page.get_by_role("button", name="Tell", exact=True))
+    expect(page.locator("#toast")).to_contain_text("A way needs two corners, and there are 0")
+    keys.press(page.get_by_role("button", name="Take it from the map"))
+    press("Enter")
+    for _ in range(2):
+        press("ArrowRight")
+        press("Enter")
+    press("Escape")
+    expect(page.get_by_label("Words")).to_be_focused()
+    expect(page.get_by_text("3 corners so far")).to_be_visible()
+    keys.press(page.get_by_role("button", name="Take the last corner back"))
+    with page.expect_request("**/api/news") as told:
+        keys.press(page.get_by_role("button", name="Tell", exact=True))
+    feature = told.value.post_data_json
+    (west, south), (east, north) = feature["geometry"]["coordinates"]
+    assert (feature["geometry"]["type"], south == north, west < east) == ("LineString", True, True)
+    assert feature["properties"]["sigma_m"] == 50.0
+
+
 def test_the_map_has_two_views_names_from_the_file_and_north(watch: Watch) -> None:
     page = watch.page
     assert watch.painted("Heat layer") > 0

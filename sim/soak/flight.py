@@ -472,6 +472,8 @@ class SoakFlight:
     def _judge(self) -> None:
         outcome = self.outcome
         outcome.violations += self.judge.violations
+        if wire := self.judge.wire:
+            outcome.said += "\n".join(["", "before the first of them, on the wire:", *wire])
         if self._wing is not None:
             outcome.violations += self._wing.judge.violations
             outcome.together = self._wing.judge.together

@@ -32,6 +32,8 @@ _ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 _BRAKE = 17  # ArduCopter's mode
 _STAND_STILL = "SET_POSITION_TARGET_LOCAL_NED"
 OPERATOR = "the operator's hold"
+_KEPT = 60  # of what went over the wire before a violation
+_TOLD = {"COMMAND_ACK", "POSITION_TARGET_GLOBAL_INT", "STATUSTEXT"}
 AFTER = " [after {}]"
 """What a violation says of the fault that came last."""
 _GUIDED = {"px4": 4 << 16 | 3 << 24, "ardupilot": 4}
@@ -49,11 +51,14 @@ _ALLOWED: dict[str, set[str]] = {
 
 
 class Judge:
-    """Reads both directions of one link. `violations` are sentences."""
+    """Reads both directions of one link. `violations` are sentences; `wire` is what went over it before the first one,
+    a line a message: what moves the aircraft, where it says it goes, its answers and texts."""
 
     def __init__(self, flavor: str, speedup: float, *, hill: bool = False) -> None:
         self._speedup, self._hill = speedup, hill
         self.violations: list[str] = []
+        self.wire: list[str] = []
+        self._lately: deque[str] = deque(maxlen=_KEPT)
         self.motions: Counter[str] = Counter()
         self.state = "WAITING"
         self._guided_mode = _GUIDED[flavor]
@@ -82,7 +87,12 @@ class Judge:
         self.steady = False  # nothing goes on that may lower the aircraft
         self.during = ""  # the fault that came last
 
+    def _keep(self, who: str, message: Any, now: float) -> None:
+        said = {name: value for name, value in message.to_dict().items() if value}
+        self._lately.append(f"{now * self._speedup:.1f} s, {who}: {said}")
+
     def _see(self, violation: str) -> None:
+        self.wire = self.wire or list(self._lately)
         self.violations.append(f"{violation}{AFTER.format(self.during)}" if self.during else violation)
 
     def ordered(self, now: float) -> None:
@@ -96,6 +106,7 @@ class Judge:
         """A person (`by`) has stopped the aircraft: until an operator orders something nothing of ours moves it."""
         with self._lock:
             self._stopped_at, self._stopped_by = now, by
+            self._lately.append(f"{now * self._speedup:.1f} s, stopped: {by}")
 
     @property
     def is_stopped(self) -> bool:
@@ -133,6 +144,8 @@ class Judge:
         if message.get_srcSystem() != 1 or message.get_srcComponent() != 1:
             return
         with self._lock:
+            if message.get_type() in _TOLD:
+                self._keep("autopilot", message, now)
             if message.get_type() == "GLOBAL_POSITION_INT":
                 self._positions.append((message.lat * 1e-7, message.lon * 1e-7))
                 self._altitude = message.alt / 1000.0
@@ -170,6 +183,7 @@ class Judge:
             if not name:
                 return
             self.motions[name] += 1
+            self._keep("service", message, now)
             for objection in self._objections(name, message, now):
                 self._see(f"{name} in {self.state}: {objection}")
 

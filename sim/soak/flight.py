@@ -334,10 +334,22 @@ class SoakFlight:
             self._pass(3.0)
         self._control.fault(name, **fault.options)
         if by := KINDS[fault.kind].stops:
+            if fault.kind in ("gcs_goes", "gcs_altitude"):
+                self._be_named(name, fault)
             self.judge.stopped(self._now(), by)
         self._pass(fault.seconds)
         if name != "battery":
             self._control.clear(name)
+
+    def _be_named(self, name: str, fault: Fault) -> None:
+        """A target that ours overtakes before the autopilot has named it, which it does twice a second, is one that
+        nobody has heard of: whoever gave it gives it again."""
+        for _ in range(4):
+            self._pass(1.5)
+            if self.judge.goes_elsewhere():
+                return
+            self._control.fault(name, **fault.options)
+        self._pass(1.5)
 
     def _stop_and_kill(self, held: bool, seconds: float) -> None:
         """A person has stopped the aircraft when the service dies: the next one leaves it so."""

@@ -21,6 +21,8 @@ from sim.soak.tap import is_probe, motion_name
 _STATE = re.compile(r"search ([A-Z]+):")
 _SLACK_S = 0.1  # frames cross on the wire
 _POSITIONS = 12
+_TARGETS = 4  # of ours that it may name
+_SAME_M = 3.0
 _ORDER_S = 15.0
 _DRAIN = 1.3 * 100.0 / ground.ENDURANCE_S  # percent a second that flying takes at most
 _LEAST_PERCENT = 15.0  # the service goes home at 20
@@ -50,6 +52,10 @@ _ALLOWED: dict[str, set[str]] = {
 }
 
 
+Place = tuple[float, float, float]
+"""Latitude, longitude, and metres above sea level."""
+
+
 class Judge:
     """Reads both directions of one link. `violations` are sentences; `wire` is what went over it before the first one,
     a line a message: what moves the aircraft, where it says it goes, its answers and texts."""
@@ -65,6 +71,8 @@ class Judge:
         self._late_s = 1.0 / speedup + _SLACK_S
         self._lock = threading.Lock()
         self._positions: deque[ground.LatLon] = deque(maxlen=_POSITIONS)
+        self._sent: deque[Place] = deque(maxlen=_TARGETS)
+        self._named: Place | None = None
         self._not_guided_since = math.inf
         self._armed = False
         self._taken_at = math.inf
@@ -108,6 +116,11 @@ class Judge:
             self._stopped_at, self._stopped_by = now, by
             self._lately.append(f"{now * self._speedup:.1f} s, stopped: {by}")
 
+    def goes_elsewhere(self) -> bool:
+        """Whether the autopilot names a target that is none of ours: somebody else's has not been overtaken by ours."""
+        with self._lock:
+            return self._named is not None and not any(_same(self._named, each) for each in self._sent)
+
     @property
     def is_stopped(self) -> bool:
         """Has a person stopped the aircraft, and nobody ordered anything since?"""
@@ -150,6 +163,10 @@ class Judge:
                 self._positions.append((message.lat * 1e-7, message.lon * 1e-7))
                 self._altitude = message.alt / 1000.0
                 self._homes.append((message.alt - message.relative_alt) / 1000.0)
+            elif message.get_type() == "POSITION_TARGET_GLOBAL_INT":
+                over_home = message.coordinate_frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+                home = self._homes[-1] if over_home and self._homes else 0.0
+                self._named = (message.lat_int * 1e-7, message.lon_int * 1e-7, message.alt + home)
             elif message.get_type() in ("SYS_STATUS", "BATTERY_STATUS"):
                 if message.battery_remaining >= 0:
                     self._level = (float(message.battery_remaining), now)
@@ -247,6 +264,7 @@ class Judge:
         if message.get_type() != "COMMAND_INT":
             return ["a place in a message that cannot carry it exactly"]
         there = (message.x * 1e-7, message.y * 1e-7)
+        self._sent.append((*there, message.z))
         found = []
         if now - self._not_guided_since > self._late_s:
             found.append(f"the mode has not been the guided one for {now - self._not_guided_since:.2f} s")
@@ -277,6 +295,10 @@ class Judge:
         if message.frame != mavlink.MAV_FRAME_GLOBAL:
             found.append(f"frame {message.frame}")
         return found
+
+
+def _same(one: Place, other: Place) -> bool:
+    return _distance(one[:2], other[:2]) < _SAME_M and abs(one[2] - other[2]) < _SAME_M
 
 
 def _distance(here: ground.LatLon, there: ground.LatLon) -> float:

@@ -189,6 +189,9 @@ KINDS: dict[str, Kind] = {
     # others who take it
     "gcs_goes": Kind(1, (15, 25), _goal, stops="a ground station's target"),
     "gcs_altitude": Kind(1, (15, 25), lambda rng: {"by": 20.0}, stops="a ground station's altitude"),
+    "gcs_speed": Kind(
+        1, (10, 20), lambda rng: {"mps": float(rng.uniform(1, 6))}, stops="a ground station's speed"
+    ),
     "second_service": Kind(
         1, (15, 40), lambda rng: {"every_s": 5.0, "component": int(rng.choice([191, 192]))}
     ),

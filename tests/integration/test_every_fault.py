@@ -72,6 +72,7 @@ ANSWERS: dict[str, tuple[str, ...]] = {
     "failsafe_hold": (TAKEN,),
     "gcs_goes": (TAKEN,),
     "gcs_altitude": (TAKEN,),
+    "gcs_speed": (TAKEN,),
     "second_service": (TAKEN,),
 }
 

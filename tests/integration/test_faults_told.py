@@ -125,6 +125,7 @@ TAKEN: dict[str, Faults] = {
     "px4": [
         ("gcs_goes", {"north": 40.0, "east": 30.0}, "sends the aircraft to"),
         ("gcs_altitude", {"by": 10.0}, "sends the aircraft to"),
+        ("gcs_speed", {"mps": 2.0}, "commands the aircraft"),
         ("pilot_hold", {"way": "flick"}, "the pilot or the autopilot selected"),
         ("failsafe_hold", {"then": "recovers"}, "failsafe"),
     ],

@@ -69,6 +69,16 @@ class Wire:
         self.judge.from_service(_from_us(message), self.now)
         return self.judge.violations[before:]
 
+    def named(self, east: float, north: float, height: float = 15.0, *, over_home: bool = False) -> None:
+        """The autopilot names its target."""
+        lon, lat = ground.ring([(east, north)])[0]
+        frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT if over_home else mavlink.MAV_FRAME_GLOBAL_INT
+        amsl = height if over_home else ground.GROUND_AMSL_M + height
+        message = mavlink.MAVLink_position_target_global_int_message(
+            0, frame, 0, round(lat * 1e7), round(lon * 1e7), amsl, *(0.0,) * 8
+        )
+        self.judge.from_autopilot(_from_autopilot(message), self.now)
+
 
 def _from_autopilot(message: Any) -> Any:
     return _decoded(message, 1, 1)
@@ -92,6 +102,32 @@ def test_the_judge_lets_a_search_be() -> None:
     wire.state("RETURNING")
     assert wire.goes(-10.0, 50.0) != []  # straight through the pond
     assert wire.goes(130.0, 20.0) == []
+
+
+def test_the_judge_knows_when_somebody_elses_target_has_reached_the_autopilot() -> None:
+    wire = Wire()
+    wire.goes(220.0, 50.0)
+    assert not wire.judge.goes_elsewhere()  # nothing is named yet
+    for over_home in (False, True):
+        wire.named(220.0, 50.0, over_home=over_home)
+        assert not wire.judge.goes_elsewhere()
+        wire.named(220.0, 50.0, 35.0, over_home=over_home)
+        assert wire.judge.goes_elsewhere()
+    wire.named(240.0, 50.0)
+    assert wire.judge.goes_elsewhere()
+    wire.goes(240.0, 50.0)
+    assert not wire.judge.goes_elsewhere()
+
+
+def test_the_judge_keeps_what_went_over_the_wire_before_a_violation() -> None:
+    wire = Wire()
+    assert wire.judge.wire == []
+    wire.named(220.0, 50.0)
+    wire.state("YIELDED")
+    wire.goes(220.0, 50.0)
+    kept = "\n".join(wire.judge.wire)
+    assert "POSITION_TARGET_GLOBAL_INT" in kept
+    assert "COMMAND_INT" in kept
 
 
 def test_ground_that_is_excluded_in_flight_is_judged_until_that_is_taken_back() -> None:

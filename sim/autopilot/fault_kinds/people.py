@@ -11,6 +11,7 @@ from sim.autopilot.host import Host
 from sim.autopilot.vehicle import Point
 
 _HOLD_S = 5.0  # COM_FAIL_ACT_T
+_STATION = (255, M.MAV_COMP_ID_MISSIONPLANNER)  # a ground station, as most call themselves
 
 
 # ---- the pilot
@@ -82,6 +83,15 @@ def _gcs_goes(a: Host, options: Options) -> None:
 def _gcs_altitude(a: Host, options: Options) -> None:
     here = a.firmware.target_or_seen()
     _go_to(a, Point(here.north, here.east, here.up + options["by"]))
+
+
+def _gcs_speed(a: Host, options: Options) -> None:
+    """DO_CHANGE_SPEED; its answer goes over all wires, as a router carries it."""
+    number, ground_speed = M.MAV_CMD_DO_CHANGE_SPEED, 1.0
+    command = ReceivedCommand(number, ground_speed, options["mps"], -1.0, 0.0, 0.0, 0.0, 0.0, None)
+    for result in a.firmware.handle(command):
+        for link in a.links:
+            link.send(M.MAVLink_command_ack_message(number, int(result), 0, 0, *_STATION))
 
 
 def _second_service(a: Host, options: Options) -> None:
@@ -162,6 +172,11 @@ PEOPLE: dict[str, Kind] = {
         "A ground station's 'Change altitude', by metres.",
         _gcs_altitude,
         {"by": 20.0},
+    ),
+    "gcs_speed": Kind(
+        "A ground station's 'Change speed'; its answer is heard on our wire.",
+        _gcs_speed,
+        {"mps": 2.0},
     ),
     "second_service": Kind(
         "A second service on the same aircraft speaks, and sends it metres from home every so many seconds (0: never).",

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from sim.autopilot.dialect import M
 from sim.autopilot.faults import Fault
 from tests.conformance.dialogue import GUIDED, PILOT
 from tests.conformance.wire import mav
@@ -229,6 +230,16 @@ def test_a_ground_station_changes_the_altitude(flight: Flight) -> None:
     flight.listen(12.0)
     assert flight.latest["GLOBAL_POSITION_INT"].relative_alt - before == pytest.approx(15_000, abs=2500)
     assert math.hypot(flight.here.north, flight.here.east) < 3.0
+
+
+def test_a_ground_station_changes_the_speed_and_the_answer_is_heard(flight: Flight) -> None:
+    flight.go(0, 60, wait=0)
+    flight.fault("gcs_speed", mps=2.0)
+    answers = [each for each in flight.heard(1.0) if each.get_type() == "COMMAND_ACK"]
+    (answer,) = [each for each in answers if each.command == M.MAV_CMD_DO_CHANGE_SPEED]
+    assert (answer.result, answer.target_system, answer.target_component) == (0, 255, 190)
+    flight.listen(8.0)
+    assert math.hypot(flight.here.north, flight.here.east) == pytest.approx(15.0, abs=4.0)
 
 
 def test_a_second_service_speaks_and_commands(flight: Flight) -> None:

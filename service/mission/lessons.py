@@ -25,6 +25,7 @@ CORNERS = 6
 UNSURE = 1
 """Cells after a beginning that are left out: how fast it came there is not known."""
 FEWEST = 4
+_STEP = (1.0, math.sqrt(2.0))  # from a cell to one of its neighbours
 
 
 class Lessons:
@@ -57,15 +58,22 @@ class Lessons:
                 self._best = min(self._best, (away, time))
                 return
             if math.isfinite(self._best[0]):
-                self._path.append(self._ahead.popleft())
-                self._times.append(self._best[1])
+                self._over(self._ahead.popleft(), self._best[1])
                 self._best = (math.inf, 0.0)
-                self._since += 1
             elif len(self._ahead) > 1 and math.dist(place, self._ahead[1]) < NEAR:
                 self._close()  # it was never over this one
                 self._ahead.popleft()
             else:
                 return
+
+    def _over(self, cell: Cell, time: float) -> None:
+        """It flew over a cell. One that is no neighbour of the last, to which it was sent across others, begins a
+        flight of its own."""
+        if self._path and math.dist(self._path[-1], cell) not in _STEP:
+            self._close()
+        self._path.append(cell)
+        self._times.append(time)
+        self._since += 1
 
     def take(self) -> tuple[Flown, ...]:
         """What was flown, when that is enough for another lesson; else nothing."""

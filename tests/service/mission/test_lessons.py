@@ -57,6 +57,17 @@ def test_a_cell_that_was_missed_parts_two_flights() -> None:
     assert path[25] not in taken[0].path
 
 
+@pytest.mark.parametrize("missing", [2, 25])
+def test_a_leg_across_other_cells_parts_two_flights(missing: int) -> None:
+    """Making room for another aircraft, a way through transit ground: what follows is no neighbour."""
+    lessons, path = Lessons(), zigzag(30)
+    fly(lessons, path)
+    rest = zigzag(130)[30 + missing :]
+    taken = fly(lessons, rest, begin=200.0)
+    assert [flight.start for flight in taken] == [path[UNSURE], rest[UNSURE]]
+    assert taken[0].path[-1] == path[-1]
+
+
 def test_only_the_last_cells_are_kept_and_a_clock_that_began_anew_parts_two_flights() -> None:
     lessons, path, taken = Lessons(), zigzag(100), []
     for _ in range(5):

@@ -5,6 +5,10 @@ detector that sees it in every frame makes any place look certain within a few l
 likely place's square had a hit in their first pass is a count of independent looks (later passes are not: the same
 stone fools it again), so it is held against the binomial distribution. While all that was seen lies around the place
 itself that says nothing: then it has to have looked somewhere in vain.
+
+A count is looked at again and again, so that sooner or later it is an unlikely one by chance, and a share is never
+quite the one of the settings. So a detector is doubted only where its false alarms are also far more than it is said to
+have: a find rests on several hits, and with twice the share each of them weighs half.
 """
 
 from __future__ import annotations
@@ -19,6 +23,8 @@ from service.geometry import Cell
 _UNLIKELY = 0.02
 """So rarely may a find of a detector that is as good as it is said to be have to wait. The doubt goes with the next
 looks in vain, while one that sees the target everywhere makes a place sure before many cells were seen."""
+_TIMES, _CHANCE = 2.0, 0.1
+"""So many times as many false alarms as it is said to have would have to be this rare a chance."""
 _FEW = 3
 """Cells, of which a detector that is as good as it is said to be hardly reports the target in all."""
 _HALF = 0.5
@@ -65,7 +71,8 @@ class Alarms:
             if max(abs(cell[0] - place[0]), abs(cell[1] - place[1])) > 1
         ]
         hits, rate = sum(beside), max(1.0 - self._p_tn, self._alarm / max(self._in_vain, 1))
-        if not hits or bdtrc(hits - 1, len(beside), rate) >= _UNLIKELY:
+        as_said, worse = (bdtrc(hits - 1, len(beside), min(each, 1.0)) for each in (rate, _TIMES * rate))
+        if not hits or as_said >= _UNLIKELY or worse >= _CHANCE:
             return self._sees_it_everywhere()
         return (
             f"the detector reported the target in {hits} of {len(beside)} cells elsewhere, where p_tn = "

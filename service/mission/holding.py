@@ -54,6 +54,8 @@ class Holding(Phase):
             yield Happen(Event.ENERGY_LOW, low, stopped=low, searched=True, direct=direct)
         elif "detector" in causes and not look.detector_silent():
             yield Release("detector", "the detector reports again")
+        elif "doubt" in causes and not look.seen.doubt:
+            yield Release("doubt", "no place waits for a person any more")
         elif "journal" in causes and self._prompt(look):
             yield Release("journal", "the journal is written again")
         elif "ground" in causes and self._clear(look):

@@ -59,6 +59,7 @@ class Outlook:
             place_in_sight=place_in_sight(search) if looks else True,
             found=search.found() if looks else None,
             confirmed=search.confirmed is not None,
+            doubt=search.doubt() if standing.flying or "doubt" in standing.causes else "",
             suspect_in_view=self._suspect_in_view(),
             missing=tuple(self.vehicle.missing()) if standing.state in (State.READY, State.GROUNDED) else (),
             others=self.formation.others(search.aircraft),

@@ -42,6 +42,7 @@ from service.motion import MotionLimits, motion_of
 
 SUSPECT_AT, CLEARED_BELOW = 0.5, 0.35
 STANDS_MPS = 1.0
+DOUBTED_S = 60.0  # so long may further looks lift what keeps a find waiting for a person
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +83,7 @@ class Searching(Phase):
         self._hit_at: float | None = None
         self._not_before = 0.0
         self._lost = False
+        self._doubted_since = math.inf
 
     @property
     def waypoint(self) -> Cell | None:  # type: ignore[override]
@@ -189,9 +191,17 @@ class Searching(Phase):
             yield _searched(f"{SEARCHED_TO} {sure(seen.searched)}{seen.left_out}")
         elif look.flight.steps >= settings.search.max_steps:
             yield _searched(f"{look.flight.steps} steps flown")
+        elif self._waits_for_a_person(look):
+            yield Hold("doubt", seen.doubt)
         elif look.detector_silent():
             yield Note(f"no detector report for {settings.sensor.silent_after_s:.0f} s: hovering", 30)
             yield Hold("detector", look.seen.why_no_report)
+
+    def _waits_for_a_person(self, look: Look) -> bool:
+        """A place is sure enough, but for a doubt that nothing has lifted for a while: all that may be is there, so the
+        search would look there again and again."""
+        self._doubted_since = min(self._doubted_since, look.now) if look.seen.doubt else math.inf
+        return look.now - self._doubted_since > DOUBTED_S
 
     # ---- steering
 

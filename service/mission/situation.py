@@ -20,7 +20,8 @@ class Situation:
     the search is at its end; `left_out`: what of the ground is given up then;
     `place_probability` that of the most likely place, `found` that place if
     it counts as found (both while searching, on the way home and between two sorties); `place_in_sight`: it can
-    be looked at from the air, as far as is known; `confirmed`: an operator said that it is the target's.
+    be looked at from the air, as far as is known; `confirmed`: an operator said that it is the target's;
+    `doubt`: why it waits for a person before it counts as found.
     `suspect_in_view`: a frame taken now shows it. `missing`: what the aircraft lacks that a search needs, as sentences'
     ends. `others`: the other aircraft of the same
     search; `over`: why that is over for all of them, which is told where there are others.
@@ -39,6 +40,7 @@ class Situation:
     place_in_sight: bool = True
     found: Found | None = None
     confirmed: bool = False
+    doubt: str = ""
     suspect_in_view: bool = False
     missing: tuple[str, ...] = ()
     others: tuple[Other, ...] = ()

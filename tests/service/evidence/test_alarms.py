@@ -49,6 +49,17 @@ def test_a_detector_that_is_as_good_as_it_is_said_to_be_is_trusted() -> None:
     assert seen(0.0, 50).why_not(PLACE) == ""
 
 
+def test_a_share_that_is_unlikely_by_chance_and_not_far_from_what_is_said_is_no_doubt() -> None:
+    """It waited for a person for fifty batteries: 16 of 807 cells, for 8."""
+    alarms = Alarms(0.9, 0.99)
+    for number in range(807):
+        alarms.add(look((20 + number // 40, number % 40), hit=number % 50 == 0 and number < 800, p_tn=0.99))
+    assert alarms.why_not(PLACE) == ""
+    for number in range(20):
+        alarms.add(look((60, number), hit=True, p_tn=0.99))
+    assert "in 36 of 827 cells elsewhere, where p_tn = 0.99 lets expect 8" in alarms.why_not(PLACE)
+
+
 def test_hits_at_the_place_itself_and_again_on_the_same_stone_are_no_false_alarms_more() -> None:
     alarms = seen(0.0, 30)
     for cell in ((4, 4), (5, 5), (6, 6)):

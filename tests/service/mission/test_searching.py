@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from service.evidence.found import Found
 from service.ground.relief import Relief
 from service.mavlink.events import Stalled
-from service.mission.effects import DropThought, Passed, Reckon, SendWaypoint, SetSpeed, Think
+from service.mission.effects import DropThought, Passed, Reckon, SendWaypoint, SetSpeed, Tell, Think
 from service.mission.heights import Leg
-from service.mission.news import Hit
-from service.mission.searching import Levelling
+from service.mission.news import Hit, Judged
+from service.mission.searching import DOUBTED_S, Levelling
 from service.mission.states import State
 from service.motion import MotionLimits
 from service.rows import TransitionRow
@@ -45,6 +46,38 @@ def test_what_the_parameters_allow_is_told_before_the_first_decision() -> None:
     talk.shows(most_acceleration_mps2=1.5)
     talk.tick()
     assert [each.limits for each in talk.wanted if isinstance(each, Reckon)][1:] == [MotionLimits(6.0, 1.5)]
+
+
+def test_a_place_that_waits_for_a_person_is_hovered_over_and_not_circled_for_ever() -> None:
+    talk, why = (
+        searching(),
+        "the detector reported the target everywhere; a person has to confirm what it finds",
+    )
+    talk.sees(place_probability=0.999, doubt=why)
+    talk.pass_by(DOUBTED_S - 5.0)
+    assert talk.state == State.CONFIRMING
+    talk.sees(doubt="")  # a few looks in vain
+    talk.pass_by(10.0)
+    talk.sees(doubt=why)
+    talk.pass_by(DOUBTED_S - 5.0)
+    assert talk.state == State.CONFIRMING
+    talk.pass_by(10.0)
+    assert (talk.state, talk.core.standing.why) == (State.HOLDING, why)
+    assert Tell(f"search HOLDING: {why}") in talk.wanted
+    talk.sees(doubt="", place_probability=0.01)  # the person rejects it
+    talk.pass_by(1.0)
+    assert talk.state == State.SEARCHING
+
+
+def test_what_a_person_confirms_while_it_is_waited_for_is_found() -> None:
+    talk = searching()
+    talk.sees(place_probability=0.999, doubt="a person has to confirm what it finds")
+    talk.pass_by(DOUBTED_S + 5.0)
+    assert talk.state == State.HOLDING
+    found = Found(*HERE, 0.999, 10.0, {})
+    talk.sees(found=found, confirmed=True, doubt="")
+    talk.on(Judged(confirmed=True, found=found, ticket=7))
+    assert talk.state == State.FOUND
 
 
 def test_it_flies_to_the_area_first() -> None:

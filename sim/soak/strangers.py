@@ -219,13 +219,16 @@ def _hold(operator: httpx.Client, tap: Tap) -> float:
 
 def _press(operator: httpx.Client, command: str, *becomes: str) -> None:
     """Give an order, again while the door is busy, until the search is in one of the states that it leads to."""
-    deadline = time.monotonic() + _PATIENCE_S
+    deadline, answer = time.monotonic() + _PATIENCE_S, "no answer"
     while True:
-        with contextlib.suppress(httpx.HTTPError):
+        try:
             said = operator.post("/api/commands", json={"command": command})
             if said.status_code == 200 and said.json()["state"] in becomes:
                 return
-        assert time.monotonic() < deadline, f"{command} was not taken"
+            answer = f"{said.status_code}: {said.text}"
+        except httpx.HTTPError as error:
+            answer = repr(error)
+        assert time.monotonic() < deadline, f"{command} was not taken: {answer}"
 
 
 def _count(folder: Path, figures: Figures) -> None:

@@ -52,6 +52,7 @@ KILLED_ALOFT_AFTER = 12
 OTHER_SYSTEM = 7
 """The system id of the second aircraft."""
 FLYING = ("SEARCHING", "CONFIRMING")
+ENDING_S = 60.0  # wall time that a service takes to end whose door is shut
 LAUNCHES = 3
 """So often a launch is ordered until it is given up."""
 LOST = 1e-9
@@ -222,6 +223,13 @@ class LongSearch:
         assert self._service is not None
         return self._service.process.poll() is not None
 
+    def ends(self) -> bool:
+        """The service ends within a while, if it has not yet."""
+        deadline = time.monotonic() + ENDING_S
+        while not self.ended() and time.monotonic() < deadline:
+            time.sleep(0.2)
+        return self.ended()
+
     def waits(self, until: Callable[[dict[str, Any]], bool]) -> bool:
         """Wait for something to be told; False when the search ended before. AssertionError when nothing comes."""
         deadline = time.monotonic() + self.search.patience_s
@@ -297,16 +305,25 @@ def fly(search: Search, folder: Path, told: Callable[[str], None] = lambda said:
         flight = LongSearch(search, folder, stack)
         try:
             flight.begin()
-            sortie = 1
-            while flight.lands(sortie):
-                told(f"sortie {sortie} landed, POS {flight.pos():.1%}")
-                between(flight, sortie)
-                sortie += 1
+            try:
+                after_sorties(flight, told)
+            except httpx.TransportError:  # found on the ground, by a report that came after the landing
+                if not flight.ends():
+                    raise
             flight.end()
         except (AssertionError, httpx.HTTPError, ValueError) as error:
             flight.flown.wrong.append(str(error))
         flight.flown.wall_s = time.monotonic() - began
         return flight.flown
+
+
+def after_sorties(flight: LongSearch, told: Callable[[str], None]) -> None:
+    """Send it up again after each landing, until the search has ended."""
+    sortie = 1
+    while flight.lands(sortie):
+        told(f"sortie {sortie} landed, POS {flight.pos():.1%}")
+        between(flight, sortie)
+        sortie += 1
 
 
 def between(flight: LongSearch, sortie: int) -> None:

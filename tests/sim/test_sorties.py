@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from rich.console import Console
 
@@ -15,7 +17,7 @@ from service.errors import BadInput
 from service.resume import retrace, stored_run
 from service.search import Search as KnownGround
 from service.survey import survey
-from sim import sorties_campaign
+from sim import sorties, sorties_campaign
 from sim.sorties import TROUBLES, Outcome, Search, area_of
 from sim.sorties_campaign import flown, lost_in, main, table, told
 from tests.service.export.recorded import Recorder
@@ -156,3 +158,35 @@ def test_the_table_has_a_line_for_each_flavour() -> None:
     lines = drawn.file.getvalue().splitlines()  # type: ignore[attr-defined]
     assert any("px4" in line and "4 to 4" in line and "20%, 40%, 50%, 60%" in line for line in lines)
     assert any("ardupilot" in line and " 0 " in line for line in lines)
+
+
+class _Shut:
+    """A search that was found on the ground: its door is shut when it is asked after the landing."""
+
+    def __init__(self, search: Search, folder: Path, stack: ExitStack) -> None:
+        self.flown, self._alive = Outcome(search), search.seed == 2
+
+    def begin(self) -> None: ...
+
+    def lands(self, sortie: int) -> bool:
+        return True
+
+    def pos(self) -> float:
+        raise httpx.ConnectError("[Errno 111] Connection refused")
+
+    def ends(self) -> bool:
+        return not self._alive
+
+    def end(self) -> None:
+        self.flown.code = 0
+
+
+def test_a_search_that_ends_on_the_ground_is_judged_and_one_that_only_does_not_answer_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sorties, "LongSearch", _Shut)
+    over, silent = (
+        sorties.fly(Search("px4", seed, 1000.0, 15.0, False, 20.0, 60.0), tmp_path) for seed in (1, 2)
+    )
+    assert (over.code, over.wrong) == (0, [])
+    assert silent.wrong == ["[Errno 111] Connection refused"]

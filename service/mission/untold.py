@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterator
 
 from service.mavlink.telemetry import Wind
@@ -24,25 +25,25 @@ class Untold:
         self.battery = ""
         """What is reckoned of the battery's level, or nothing while that is told."""
         self._wind_said = self._home_said = False
+        self._heard_at = math.inf  # first, by this process
 
     def tick(self, look: Look, wind: Wind | None) -> Iterator[Wish]:
         """Look at the battery's level, and at the wind as it is told or reckoned (None: not known)."""
+        if look.heard():
+            self._heard_at = min(self._heard_at, look.now)
+        aloft_s = min(look.flight.aloft_s(look.now), look.now - self._heard_at)
         if not on_ground(look.seen.telemetry):
-            doubt = look.energy.warning() if look.flight.aloft_s(look.now) > BATTERY_S else ""
+            doubt = look.energy.warning() if aloft_s > BATTERY_S else ""
             if doubt and not self.battery:
                 yield from self._say(doubt)
             self.battery = doubt
-        if (
-            look.seen.telemetry.home is None
-            and not self._home_said
-            and look.flight.aloft_s(look.now) > HOME_S
-        ):
+        if look.seen.telemetry.home is None and not self._home_said and aloft_s > HOME_S:
             self._home_said = True
             yield from self._say("home is not told: the launch point of the area is taken for it")
         if not look.standing.flying:
             return
         self._wind_said &= wind is None
-        if wind is None and not self._wind_said and look.flight.aloft_s(look.now) > WIND_S:
+        if wind is None and not self._wind_said and aloft_s > WIND_S:
             self._wind_said = True
             said = "the wind is not known, neither told nor reckoned from the lean: max_wind_mps does nothing"
             yield Note(said, logging.WARNING)

@@ -24,12 +24,13 @@ from service.mission.effects import (
     Tell,
     WriteRow,
 )
+from service.mission.flight import Flight
 from service.mission.limits import Objection
 from service.mission.news import Done, NotSent, NotStopped, Order
 from service.mission.phase import RETRY_S
 from service.mission.states import FINAL, FLYING, TABLE, Event, State
 from service.rows import CommandRow, TransitionRow
-from tests.service.mission.flown import Talk, place, reached, searching
+from tests.service.mission.flown import START, Talk, place, reached, searching
 
 CHANGES = [(*pair, after) for pair, after in TABLE.items()]
 MOVING = {State.SEARCHING, State.CONFIRMING, State.RETURNING}
@@ -257,6 +258,15 @@ def test_a_home_that_is_not_told_is_said_once() -> None:
     did = talk.pass_by(60.0)
     said = "search: home is not told: the launch point of the area is taken for it"
     assert [each.text for each in did if isinstance(each, Tell)].count(said) == 1
+
+
+def test_what_a_restart_in_the_air_has_not_heard_yet_is_not_called_untold() -> None:
+    talk = Talk(flight=Flight(flown=True, carried_s=300.0, left_at=START), home=None, battery_percent=None)
+    talk.pass_by(5.0)
+    assert not [each for each in talk.wanted if isinstance(each, Tell) and "not " in each.text]
+    talk.pass_by(20.0)
+    said = [each.text for each in talk.wanted if isinstance(each, Tell) and "not " in each.text]
+    assert [each.split(":")[1] for each in said] == [" the battery's level is not known", " home is not told"]
 
 
 def test_a_wind_that_is_neither_told_nor_reckoned_is_said_once() -> None:

@@ -38,9 +38,7 @@ from sim.soak.wing import Wing
 
 _FINAL = {"DONE", "ABORTED"}
 _FLYING = {"SEARCHING", "CONFIRMING"}
-_PATIENCE_S = (
-    90.0  # wall time that a machine with nothing else to do would take: what takes longer never ends
-)
+_PATIENCE_S = 90.0  # wall time of a machine with nothing else to do: what takes longer never ends
 _SLOWER = 10.0  # so many times as long it may take on one that has
 _COMPILED_S = 400.0  # the first flight on a machine compiles the planner
 _HELP_AFTER_S = 8.0  # vehicle time after which the operator resumes a search that does not go on by itself
@@ -334,7 +332,7 @@ class SoakFlight:
             self._pass(3.0)
         self._control.fault(name, **fault.options)
         if by := KINDS[fault.kind].stops:
-            if fault.kind in ("gcs_goes", "gcs_altitude"):
+            if KINDS[fault.kind].named:
                 self._be_named(name, fault)
             self.judge.stopped(self._now(), by)
         self._pass(fault.seconds)
@@ -471,13 +469,6 @@ class SoakFlight:
         here = (state["latitude"], state["longitude"])
         self.judge.truth(state["above_ground"], here, self._now(), crashed=crashed)
         return state
-
-    def _until(self, condition: Callable[[], bool], complaint: str) -> None:
-        deadline = self._now() + _PATIENCE_S
-        while not condition():
-            if self._now() > deadline or self._service.process.poll() is not None:
-                raise Trouble(complaint)
-            time.sleep(0.1)
 
     # ---- afterwards
 

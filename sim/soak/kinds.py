@@ -120,6 +120,7 @@ class Kind:
     options: Callable[[Generator], Options] = _nothing
     last: bool = False
     stops: str = ""  # who stops the aircraft by it: nothing of ours may move it until an operator says so
+    named: bool = False  # and nobody can know of it before the autopilot names its target
     steady: bool = False  # the aircraft is as high as ever all the while
 
 
@@ -187,8 +188,10 @@ KINDS: dict[str, Kind] = {
         1, (4, 12), lambda rng: {"reckons_s": 30.0, "drift_mps": float(rng.uniform(0, 0.5))}
     ),
     # others who take it
-    "gcs_goes": Kind(1, (15, 25), _goal, stops="a ground station's target"),
-    "gcs_altitude": Kind(1, (15, 25), lambda rng: {"by": 20.0}, stops="a ground station's altitude"),
+    "gcs_goes": Kind(1, (15, 25), _goal, stops="a ground station's target", named=True),
+    "gcs_altitude": Kind(
+        1, (15, 25), lambda rng: {"by": 20.0}, stops="a ground station's altitude", named=True
+    ),
     "gcs_speed": Kind(
         1, (10, 20), lambda rng: {"mps": float(rng.uniform(1, 6))}, stops="a ground station's speed"
     ),

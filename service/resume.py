@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -214,9 +214,12 @@ def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standi
     """How the mission of a journal stood when it was left, with the search retraced.
 
     A restart that came no further than to hear the vehicle has changed nothing, nor has a fault that ended a process.
+    What was over for this aircraft while the run went on with another one is over.
     """
     standing = Standing()
-    for row in (row for entry, row in _transitions(journal) if entry in whose):
+    rows = list(_transitions(journal))
+    out = _out_of_it(rows, whose)
+    for row in (row for entry, row in rows if entry in whose):
         if row.after in (State.READY, State.ABORTED):
             continue
         settled = standing.settled or row.event in SETTLED
@@ -240,6 +243,16 @@ def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standi
         else:
             standing = replace(standing, state=row.after, why=row.reason)
         standing = replace(standing, settled=settled, enough=enough)
+    if out is not None:
+        why = standing.why_stopped or out.reason
+        return replace(
+            standing,
+            state=out.after,
+            why=out.reason,
+            why_stopped=why,
+            causes=frozenset(),
+            found=search.found(),
+        )
     if standing.state == State.DONE:  # down before the search was over: whatever comes next is another flight
         return Standing()
     found = search.found()
@@ -249,6 +262,16 @@ def left_standing(journal: Path, search: Search, whose: Whose = ALONE) -> Standi
         )  # over a place that waits for a person's word
     going = standing.state in (State.RETURNING, State.FOUND)
     return replace(standing, found=found, why_stopped="" if found and going else standing.why_stopped)
+
+
+def _out_of_it(rows: Sequence[tuple[Entry, TransitionRow]], whose: Whose) -> TransitionRow | None:
+    """The row by which an aircraft landed for good or was aborted by an operator, while the run goes on with others."""
+    last = {entry.aircraft: (entry, row) for entry, row in rows}
+    if all(row.after in FINAL for _, row in last.values()):
+        return None
+    own = [row for entry, row in last.values() if entry in whose]
+    out = own[-1] if own else None
+    return out if out is not None and (out.after == State.DONE or _end_of(out) == ABORTED) else None
 
 
 def left_flight(journal: Path, search: Search, whose: Whose = ALONE) -> Flight:

@@ -128,7 +128,8 @@ class MissionCore:
         settings: those of the run.
         grid: the ground.
         terms: on what terms it flies.
-        standing: as the run that this one goes on with was left; as new by default.
+        standing: as the run that this one goes on with was left, which may be over for this aircraft; as new by
+            default.
         flight: what was flown in that run.
     """
 
@@ -156,10 +157,12 @@ class MissionCore:
         # as an earlier process left it; with what was asked of it since, and without
         self._left = self._flown_as = self.standing
         self._logbook = Logbook(self.flight, self._left)
-        self.standing = replace(
-            self.standing, state=State.WAITING, causes=frozenset(), homeward=self._left.goes_home
-        )
-        self._phase: Phase = Waiting(between=self._left.state == State.GROUNDED)
+        self._phase: Phase = Phase()
+        if self._left.state not in FINAL:
+            self.standing = replace(
+                self.standing, state=State.WAITING, causes=frozenset(), homeward=self._left.goes_home
+            )
+            self._phase = Waiting(between=self._left.state == State.GROUNDED)
         self._pending: Pending | None = None
         self._effects: list[Effect] = []
         self._seen, self._now = Situation(), 0.0

@@ -12,7 +12,9 @@ import pytest
 from service.config import Settings
 from service.errors import BadInput
 from service.journal import Journal
-from service.mission.states import State
+from service.mission.orders import ASKED
+from service.mission.standing import Standing
+from service.mission.states import FINAL, State
 from service.provenance import note_beginning, note_resumption
 from service.resume import (
     ALONE,
@@ -267,10 +269,12 @@ def test_an_area_file_that_was_changed_in_flight_begins_no_second_search_beside_
     assert words in said
 
 
-def of_two(folder: Path, north: Sequence[Step], south: Sequence[Step], *more: dict[str, object]) -> Path:
+def of_two(
+    folder: Path, north: Sequence[Step], south: Sequence[Step], *more: dict[str, object], why: str = "so"
+) -> Path:
     """A journal in which two aircraft did these steps, and the second has these rows of its flight."""
     rows: list[tuple[str, Mapping[str, object]]] = [
-        ("transition", {"from": before, "event": event, "to": to, "reason": "so", "aircraft": name})
+        ("transition", {"from": before, "event": event, "to": to, "reason": why, "aircraft": name})
         for name, steps in (("north", north), ("south", south))
         for before, event, to in steps
     ]
@@ -307,6 +311,27 @@ def test_each_of_two_aircraft_is_taken_up_as_it_was_left(tmp_path: Path) -> None
     assert left_standing(journal, search, north).state == State.SEARCHING
     assert left_standing(journal, search, south).state == State.YIELDED
     assert (left_flight(journal, search, north).steps, left_flight(journal, search, south).steps) == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("steps", "why", "state"),
+    [
+        ([*LOW, LANDED], "so", State.DONE),
+        ([*UP, ("SEARCHING", "abort", "ABORTED")], ASKED, State.ABORTED),
+        ([*UP, ("SEARCHING", "abort", "ABORTED")], "the link is lost", State.SEARCHING),  # a fault of its own
+    ],
+)
+def test_what_was_over_for_one_while_another_flew_stays_so(
+    steps: Sequence[Step], why: str, state: State, tmp_path: Path
+) -> None:
+    def standing(north: Sequence[Step]) -> Standing:
+        journal = of_two(tmp_path / f"{len(north)}", north, steps, why=why)
+        return left_standing(journal, Search(GRID, Settings()), Whose("south", first=False))
+
+    assert standing(UP).state == state
+    assert bool(standing(UP).why_stopped) == (state in FINAL)
+    both = standing([*LOW, LANDED]).state  # the run has ended, and another flight goes on with it
+    assert both == (State.WAITING if state == State.DONE else State.SEARCHING)
 
 
 def test_what_flew_alone_before_is_the_first_ones(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from service.mission.flight import Flight
 from service.mission.limits import Objection
 from service.mission.news import Done, NotSent, NotStopped, Order
 from service.mission.phase import RETRY_S
+from service.mission.standing import Standing
 from service.mission.states import FINAL, FLYING, TABLE, Event, State
 from service.rows import CommandRow, TransitionRow
 from tests.service.mission.flown import START, Talk, place, reached, searching
@@ -301,3 +302,12 @@ def test_why_it_is_as_it_is_does_not_grow_with_every_notice() -> None:
     assert said.startswith(why)
     assert said.endswith("flies 499 m/s, asked for 5")
     assert len(said) < 600
+
+
+@pytest.mark.parametrize("state", sorted(FINAL))
+def test_what_is_over_for_an_aircraft_is_over_in_the_next_process_too(state: State) -> None:
+    talk = Talk(may_take_off=True, standing=Standing(state=state, why="so", why_stopped="so"))
+    assert talk.state == state
+    assert not [each for each in talk.pass_by(5.0) if not isinstance(each, Note)]
+    (said,) = [each for each in talk.on(Order("launch", 1)) if isinstance(each, Answer)]
+    assert (bool(said.refused), talk.state) == (True, state)

@@ -45,6 +45,7 @@ from service.mavlink.events import (
 )
 from service.mavlink.framing import Message, own_heartbeat
 from service.mavlink.modes import BY_ITSELF, mode_title
+from service.mavlink.sources import SOURCES
 from service.mavlink.state import LinkMemory, speaks_as
 from service.mavlink.streams import Streams, streams_of
 from service.mavlink.target import Step
@@ -432,6 +433,8 @@ class LinkCore(LinkMemory):
             self._judge_readiness(now)
         elif name == "POSITION_TARGET_GLOBAL_INT":
             self._named(self.telemetry.target_amsl, now)
+        elif name == "POSITION_TARGET_LOCAL_NED" and SOURCES[name].told_by(self.telemetry.autopilot):
+            self._steered(now)
 
     def _sea_moved(self, by_m: float, now: float) -> None:
         """Altitudes were corrected: a target of ours may have another name now, and is not repeated by its old one."""
@@ -454,6 +457,12 @@ class LinkCore(LinkMemory):
             failsafe = any("failsafe" in text.lower() for text in self._lately_said(now))
             by = "the autopilot's failsafe" if failsafe else self._company.commander(now)
             self._replaced(stranger, by, now)
+
+    def _steered(self, now: float) -> None:
+        t = self.telemetry
+        flies = t.in_control and t.guided and t.armed and t.landed_state == "in_air"
+        if flies and self._strangers.on_steered(bool(t.steered), now):
+            self._replaced(None, self._company.commander(now), now)
 
     def _replaced(self, found: Target | None, by: str, now: float) -> None:
         """Somebody else sends it somewhere, or has it do something else: it is theirs."""

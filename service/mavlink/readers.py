@@ -31,6 +31,11 @@ _IGNORES_POSITION = (
     | mavlink.POSITION_TARGET_TYPEMASK_Y_IGNORE
     | mavlink.POSITION_TARGET_TYPEMASK_Z_IGNORE
 )
+_IGNORES_VELOCITY = (
+    mavlink.POSITION_TARGET_TYPEMASK_VX_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VY_IGNORE
+    | mavlink.POSITION_TARGET_TYPEMASK_VZ_IGNORE
+)
 _OVER_HOME = (
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
@@ -176,6 +181,13 @@ def _position_target(m: KnownFields) -> Fields:
     return {"target": Target(lat, lon, alt), "target_over_home": m.flags("coordinate_frame") in _OVER_HOME}
 
 
+def _local_target(m: KnownFields) -> Fields:
+    """ArduCopter tells by the mask what its guided mode follows: a place alone is a waypoint."""
+    mask = m.flags("type_mask")
+    waypoint = not mask & _IGNORES_POSITION and mask & _IGNORES_VELOCITY == _IGNORES_VELOCITY
+    return {"steered": not waypoint}
+
+
 def _rc_channels(m: KnownFields) -> Fields:
     """How far the roll, pitch and yaw sticks are from the middle; the throttle has none on many transmitters."""
     channels = [m.read(name) for name in _STICK_CHANNELS] if m.flags("chancount") else []
@@ -222,6 +234,7 @@ READERS: dict[str, Reader] = {
     "ESTIMATOR_STATUS": _estimator_status,
     "EKF_STATUS_REPORT": _ekf_status,
     "POSITION_TARGET_GLOBAL_INT": _position_target,
+    "POSITION_TARGET_LOCAL_NED": _local_target,
     "DISTANCE_SENSOR": _distance_sensor,
     "TERRAIN_REPORT": _terrain_report,
     "RC_CHANNELS": _rc_channels,

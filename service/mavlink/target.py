@@ -11,6 +11,7 @@ a time:
 Beside it `Strangers` knows what the autopilot may name: the last few of ours, and where it hovered when we took it
 over. Another place named twice was given by somebody else (TargetReplaced), whether a target of ours is watched or not.
 So was one named once that a waypoint of ours, already on its way then, has replaced: that person was overtaken.
+Somebody who steers it by a velocity names no place at all; ArduCopter tells that it follows one.
 """
 
 from __future__ import annotations
@@ -78,6 +79,7 @@ class Strangers:
         self._times_resting = 0
         self._suspect: Target | None = None
         self._times_suspect = 0
+        self._times_steered = 0
         self._sent_at = self._suspect_at = -math.inf
         self._off_until = -math.inf
 
@@ -100,6 +102,7 @@ class Strangers:
         self._ours.clear()
         self._settled, self._resting, self._times_resting = False, None, 0
         self._named = None
+        self._times_steered = 0
         self._suspect, self._times_suspect = None, 0
 
     def sent(self, target: Target, now: float) -> None:
@@ -134,6 +137,13 @@ class Strangers:
             self._resting = named  # one that still brakes, or drifts, names where it is
         self._suspect, self._times_suspect = None, 0
         return overtaken
+
+    def on_steered(self, steered: bool, now: float) -> bool:
+        """The autopilot tells whether it flies a velocity or a place; whether it is sure that somebody has begun to
+        steer it, where it flew to a place of ours."""
+        theirs = steered and self._named is not None and now >= self._off_until
+        self._times_steered = self._times_steered + 1 if theirs else 0
+        return self._times_steered >= _REPLACED_AFTER
 
     def _overtaken(self, named: Target) -> Target | None:
         """What somebody else gave it just before the last of ours, which it names now, came."""

@@ -113,6 +113,8 @@ class Telemetry:
     target: Target | None = None
     """What POSITION_TARGET_GLOBAL_INT names; its altitude is above home if `target_over_home`."""
     target_over_home: bool = False
+    steered: bool | None = None
+    """Whether the autopilot follows a velocity or the like in its guided mode, and no waypoint."""
     return_height_m: float | None = None
     """How high above home the autopilot flies home by itself, as its parameter says; None: not told."""
     most_speed_mps: float | None = None

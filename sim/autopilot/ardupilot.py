@@ -12,6 +12,7 @@ from sim.autopilot.behaviours import (
     FollowSticks,
     GoTo,
     Land,
+    Paused,
     Return,
     Stand,
     TakeOff,
@@ -215,7 +216,8 @@ class ArduCopter(Firmware):
         if not self._steers_to_place:
             self._steers_to_place = True
             self.vehicle.speed_limit = None
-        self.vehicle.behaviour = leg
+        paused = isinstance(self.vehicle.behaviour, Paused)  # until it is continued, or the mode is left
+        self.vehicle.behaviour = Paused(leg) if paused else leg
 
     def set_mode(self, mode: str, behaviour: Behaviour | None = None) -> None:
         if mode != self.mode:
@@ -240,6 +242,22 @@ class ArduCopter(Firmware):
             return FAILED
         self._fence_on = command.param1 == 1.0
         return ACCEPTED
+
+    def on_pause_continue(self, command: ReceivedCommand) -> Results:
+        """In GUIDED it stays where it is, whatever target it is given, until it is continued (`ModeGuided::pause`)."""
+        vehicle = self.vehicle
+        if self.mode != "GUIDED" or not vehicle.flying or command.param1 not in (0.0, 1.0):
+            return FAILED
+        behaviour = vehicle.behaviour
+        if command.param1 == 0.0 and not isinstance(behaviour, Paused):
+            self.fly(Paused(behaviour))
+        elif command.param1 == 1.0 and isinstance(behaviour, Paused):
+            self.fly(behaviour.leg)
+        return ACCEPTED
+
+    @property
+    def steered(self) -> bool:
+        return self.mode == "GUIDED" and self.vehicle.behaviour is self._setpoints
 
     def on_mission_start(self, command: ReceivedCommand) -> Results:
         if len(self.plan.mission) < 2 or not self.vehicle.armed:

@@ -94,6 +94,18 @@ class Hold(Behaviour):
         demand.climb, demand.descend, demand.yaw = vehicle.limits.climb, vehicle.limits.descend, None
 
 
+class Paused(Hold):
+    """Brake and hold while a leg waits to be flown on; the target that is named is the leg's."""
+
+    def __init__(self, leg: Behaviour) -> None:
+        super().__init__()
+        self.leg = leg
+
+    @property
+    def target(self) -> Point | None:
+        return self.leg.target
+
+
 class TakeOff(Behaviour):
     """Spool the motors up, climb straight to a height, slower below `slow_below`."""
 

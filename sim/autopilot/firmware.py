@@ -72,6 +72,7 @@ class Firmware(ABC):
             M.MAV_CMD_DO_SET_HOME: self.on_set_home,
             M.MAV_CMD_MISSION_START: self.on_mission_start,
             M.MAV_CMD_DO_SET_MISSION_CURRENT: self.on_set_current,
+            M.MAV_CMD_DO_PAUSE_CONTINUE: self.on_pause_continue,
         }
         self.boot()
 
@@ -216,6 +217,10 @@ class Firmware(ABC):
         """DO_FENCE_ENABLE."""
         return UNSUPPORTED
 
+    def on_pause_continue(self, command: ReceivedCommand) -> Results:
+        """DO_PAUSE_CONTINUE."""
+        return UNSUPPORTED
+
     def on_set_home(self, command: ReceivedCommand) -> Results:
         """DO_SET_HOME: to where it is, or to a place."""
         vehicle = self.vehicle
@@ -345,6 +350,11 @@ class Firmware(ABC):
         if not math.isfinite(altitude):
             return self.target_or_seen().up
         return altitude - self.vehicle.ground_amsl
+
+    @property
+    def steered(self) -> bool:
+        """Whether it flies a velocity that somebody gives it, and to no place."""
+        return False
 
     def target_or_seen(self) -> Point:
         """Where it is going, or where it is."""

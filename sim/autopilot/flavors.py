@@ -35,6 +35,8 @@ class Flavor:
     pilot_mode: str  # the mode a pilot takes over with
     hold_mode: str  # the mode a pilot lets it hold with
     failsafe_hold: tuple[str, str]  # the mode and the text of a failsafe that holds first
+    setpoint_mode: str  # the mode in which it follows a stream of setpoints
+    pauses_by: int  # MAV_CMD with which a ground station has it pause
     # ---- when it does what
     home_share: float  # of the time from boot to ready, until home is set
     landing_takes_s: float  # touch-down until ON_GROUND
@@ -49,6 +51,7 @@ class Flavor:
     not_ready_warning: str  # what it says of it unasked
     sticks_at_rest: bool  # RC_CHANNELS also while nobody holds sticks
     target_fields: tuple[int, int, bool]  # POSITION_TARGET: frame, type mask, silent on the ground
+    tells_local_target: bool  # POSITION_TARGET_LOCAL_NED in the guided mode
     # ---- how it answers
     unknown_request: Results  # REQUEST_MESSAGE for an id it does not know
     unknown_interval: Results  # SET_MESSAGE_INTERVAL for an id it does not know
@@ -116,6 +119,8 @@ PX4 = Flavor(
     pilot_mode="POSCTL",
     hold_mode="AUTO_LOITER",
     failsafe_hold=("AUTO_LOITER", "Failsafe activated: entering Hold for 5 seconds"),
+    setpoint_mode="OFFBOARD",
+    pauses_by=M.MAV_CMD_DO_REPOSITION,
     home_share=0.2,
     landing_takes_s=1.0,
     disarm_after_landing_s=2.0,
@@ -151,6 +156,7 @@ PX4 = Flavor(
     not_ready_warning="Preflight Fail: ekf2 missing data",
     sticks_at_rest=False,
     target_fields=(M.MAV_FRAME_GLOBAL_INT, 0, True),
+    tells_local_target=False,
     unknown_request=(Result.DENIED,),
     unknown_interval=(Result.FAILED,),
     requests_interval_message=False,
@@ -216,6 +222,8 @@ ARDUCOPTER = Flavor(
     pilot_mode="LOITER",
     hold_mode="LOITER",
     failsafe_hold=("BRAKE", "Radio Failsafe"),
+    setpoint_mode="GUIDED",
+    pauses_by=M.MAV_CMD_DO_PAUSE_CONTINUE,
     home_share=0.8,
     landing_takes_s=1.6,
     disarm_after_landing_s=0.5,
@@ -235,6 +243,7 @@ ARDUCOPTER = Flavor(
     not_ready_warning="PreArm: Need Position Estimate",
     sticks_at_rest=True,
     target_fields=(M.MAV_FRAME_GLOBAL, 65016, False),
+    tells_local_target=True,
     unknown_request=(Result.FAILED,),
     unknown_interval=(Result.DENIED,),
     requests_interval_message=True,

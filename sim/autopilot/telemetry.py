@@ -235,12 +235,29 @@ def position_target_global_int(a: Host) -> Any | None:
     """POSITION_TARGET_GLOBAL_INT: the final target at once, altitude AMSL."""
     target = a.firmware.target_or_seen()
     frame, mask, stays_silent = a.firmware.flavor.target_fields
-    if stays_silent and not a.vehicle.flying:
+    if (stays_silent and not a.vehicle.flying) or a.firmware.steered:
         return None
     latitude, longitude = a.vehicle.frame.to_e7(target.north, target.east)
     return M.MAVLink_position_target_global_int_message(
         a.time_ms, frame, mask, _i32(latitude), _i32(longitude), a.vehicle.amsl(target.up), *(0.0,) * 8
     )
+
+
+def position_target_local_ned(a: Host) -> Any | None:
+    """POSITION_TARGET_LOCAL_NED of ArduCopter in GUIDED: the place it flies to, or that it flies a velocity."""
+    if not a.firmware.flavor.tells_local_target or a.firmware.mode != "GUIDED":
+        return None
+    position, rest = 0x0007, 0x0C00  # what is ignored: the yaw always
+    frame = M.MAV_FRAME_LOCAL_NED
+    if a.firmware.steered:
+        demanded = a.vehicle.body
+        velocity = demanded.velocity_north, demanded.velocity_east, -demanded.velocity_up
+        return M.MAVLink_position_target_local_ned_message(
+            a.time_ms, frame, position | rest, 0.0, 0.0, 0.0, *velocity, *(0.0,) * 5
+        )
+    target, origin = a.firmware.target_or_seen(), a.vehicle.origin
+    place = target.north - origin.north, target.east - origin.east, origin.up - target.up
+    return M.MAVLink_position_target_local_ned_message(a.time_ms, frame, 0x01F8 | rest, *place, *(0.0,) * 8)
 
 
 def _i32(value: int) -> int:
@@ -391,6 +408,7 @@ BUILDERS: dict[int, Builder] = {
     M.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: gps_global_origin,
     M.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
     M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: position_target_global_int,
+    M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: position_target_local_ned,
     M.MAVLINK_MSG_ID_ALTITUDE: altitude,
     M.MAVLINK_MSG_ID_SYSTEM_TIME: system_time,
     M.MAVLINK_MSG_ID_MISSION_CURRENT: mission_current,

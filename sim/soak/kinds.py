@@ -107,6 +107,10 @@ def _goal(rng: Generator) -> Options:
     return {"north": float(rng.uniform(20, 120)), "east": float(rng.uniform(-60, -20)), "up": 25.0}
 
 
+def _velocity(rng: Generator) -> Options:
+    return {"north": float(rng.uniform(-2, 2)), "east": float(rng.uniform(-2, 2))}
+
+
 def _lying_detector(rng: Generator) -> Options:
     return {"way": str(rng.choice(["swapped", "nowhere", "far", "everywhere", "still", "pose"]))}
 
@@ -195,6 +199,8 @@ KINDS: dict[str, Kind] = {
     "gcs_speed": Kind(
         1, (10, 20), lambda rng: {"mps": float(rng.uniform(1, 6))}, stops="a ground station's speed"
     ),
+    "gcs_pauses": Kind(1, (10, 20), stops="a ground station's pause", named=True),
+    "gcs_velocity": Kind(1, (10, 20), _velocity, stops="a ground station's velocity", named=True),
     "second_service": Kind(
         1, (15, 40), lambda rng: {"every_s": 5.0, "component": int(rng.choice([191, 192]))}
     ),

@@ -73,6 +73,8 @@ ANSWERS: dict[str, tuple[str, ...]] = {
     "gcs_goes": (TAKEN,),
     "gcs_altitude": (TAKEN,),
     "gcs_speed": (TAKEN,),
+    "gcs_pauses": (TAKEN,),
+    "gcs_velocity": (TAKEN,),
     "second_service": (TAKEN,),
 }
 

@@ -126,12 +126,16 @@ TAKEN: dict[str, Faults] = {
         ("gcs_goes", {"north": 40.0, "east": 30.0}, "sends the aircraft to"),
         ("gcs_altitude", {"by": 10.0}, "sends the aircraft to"),
         ("gcs_speed", {"mps": 2.0}, "commands the aircraft"),
+        ("gcs_pauses", {}, "sends the aircraft to"),
+        ("gcs_velocity", {"north": 2.0, "east": 0.0}, "the pilot or the autopilot selected"),
         ("pilot_hold", {"way": "flick"}, "the pilot or the autopilot selected"),
         ("failsafe_hold", {"then": "recovers"}, "failsafe"),
     ],
     "ardupilot": [
         ("gcs_goes", {"north": 40.0, "east": 30.0}, "sends the aircraft to"),
         ("second_service", {"every_s": 3.0, "component": 191}, "sends the aircraft to"),
+        ("gcs_pauses", {}, "commands the aircraft"),
+        ("gcs_velocity", {"north": 2.0, "east": 0.0}, "commands the aircraft"),
         ("pilot_hold", {"way": "again"}, "the pilot or the autopilot selected LOITER"),
     ],
 }

@@ -85,13 +85,40 @@ def _gcs_altitude(a: Host, options: Options) -> None:
     _go_to(a, Point(here.north, here.east, here.up + options["by"]))
 
 
-def _gcs_speed(a: Host, options: Options) -> None:
-    """DO_CHANGE_SPEED; its answer goes over all wires, as a router carries it."""
-    number, ground_speed = M.MAV_CMD_DO_CHANGE_SPEED, 1.0
-    command = ReceivedCommand(number, ground_speed, options["mps"], -1.0, 0.0, 0.0, 0.0, 0.0, None)
-    for result in a.firmware.handle(command):
+def _answered(a: Host, number: int, *given: float) -> None:
+    """A command of up to three parameters, whose answer goes over all wires, as a router carries it."""
+    one, two, three = (*given, 0.0, 0.0)[:3]
+    for result in a.firmware.handle(ReceivedCommand(number, one, two, three, 0.0, 0.0, 0.0, 0.0, None)):
         for link in a.links:
             link.send(M.MAVLink_command_ack_message(number, int(result), 0, 0, *_STATION))
+
+
+def _gcs_speed(a: Host, options: Options) -> None:
+    ground_speed = 1.0
+    _answered(a, M.MAV_CMD_DO_CHANGE_SPEED, ground_speed, options["mps"], -1.0)
+
+
+def _gcs_pauses(a: Host, options: Options) -> None:
+    """As ground stations do: PX4 is sent nowhere, and nothing of that is on our wire; ArduCopter pauses."""
+    if a.firmware.flavor.pauses_by == M.MAV_CMD_DO_REPOSITION:
+        nowhere = (math.nan,) * 4
+        a.firmware.handle(ReceivedCommand(M.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, *nowhere, None))
+    else:
+        _answered(a, M.MAV_CMD_DO_PAUSE_CONTINUE, 0.0)
+
+
+def _gcs_continues(a: Host, options: Options) -> None:
+    _answered(a, M.MAV_CMD_DO_PAUSE_CONTINUE, 1.0)
+
+
+def _gcs_velocity(a: Host, options: Options) -> None:
+    a.firmware.on_setpoint(None, (options["north"], options["east"], 0.0), None)
+
+
+def _gcs_velocity_begins(a: Host, options: Options) -> None:
+    _gcs_velocity(a, options)
+    if a.firmware.mode != a.firmware.flavor.setpoint_mode and a.vehicle.flying:
+        a.firmware.pilot(a.firmware.flavor.setpoint_mode)
 
 
 def _second_service(a: Host, options: Options) -> None:
@@ -177,6 +204,18 @@ PEOPLE: dict[str, Kind] = {
         "A ground station's 'Change speed'; its answer is heard on our wire.",
         _gcs_speed,
         {"mps": 2.0},
+    ),
+    "gcs_pauses": Kind(
+        "A ground station's 'Pause': PX4 is told to stop where it is; ArduCopter stays where it is, whatever target "
+        "it is given, and its answer is heard on our wire.",
+        _gcs_pauses,
+        end=_gcs_continues,
+    ),
+    "gcs_velocity": Kind(
+        "Somebody flies it by a velocity, m/s, ten times a second: ArduCopter in the guided mode, PX4 in OFFBOARD.",
+        _gcs_velocity_begins,
+        {"north": 2.0, "east": 0.0},
+        step=_gcs_velocity,
     ),
     "second_service": Kind(
         "A second service on the same aircraft speaks, and sends it metres from home every so many seconds (0: never).",

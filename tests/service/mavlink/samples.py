@@ -40,6 +40,7 @@ SAMPLES: dict[str, Any] = {
         mavlink.MAVLink_position_target_global_int_message(
             1000, 5, 0, 470000000, 80000000, 509.0, *[0.0] * 8
         ),
+        mavlink.MAVLink_position_target_local_ned_message(1000, 1, 0x0DC7, *[0.0] * 11),
         mavlink.MAVLink_rc_channels_message(1000, 8, 1500, 1900, 1500, 1500, *[0] * 14, 200),
         mavlink.MAVLink_manual_control_message(1, 800, 0, 500, 0, 0),
         mavlink.MAVLink_distance_sensor_message(

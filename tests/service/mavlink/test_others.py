@@ -192,6 +192,59 @@ def test_who_gave_it_is_named_when_the_answer_to_it_was_heard() -> None:
     assert replaced.by == "system 255, component 190 (DO_REPOSITION)"
 
 
+def follows(rig: Rig, mask: int, times: int = 1) -> None:
+    """ArduCopter tells what its guided mode follows."""
+    for _ in range(times):
+        rig.run(0.5)
+        message = mavlink.MAVLink_position_target_local_ned_message(
+            rig.peer.boot_ms(rig.now), mavlink.MAV_FRAME_LOCAL_NED, mask, *[0.0] * 11
+        )
+        rig.say(rig.peer.pack(message))
+
+
+PLACE, VELOCITY, BOTH, ACCELERATION = 0x0DF8, 0x0DC7, 0x0C00, 0x0C3F
+
+
+@pytest.mark.parametrize("mask", [VELOCITY, BOTH, ACCELERATION])
+def test_who_steers_it_without_a_waypoint_takes_it(mask: int) -> None:
+    rig = searching("ardupilot")
+    rig.peer.target = None
+    follows(rig, PLACE, times=3)
+    follows(rig, mask)
+    follows(rig, PLACE)  # a waypoint of ours came after it
+    follows(rig, mask)
+    assert rig.of(TargetReplaced) == []
+    follows(rig, mask)
+    (replaced,) = rig.of(TargetReplaced)
+    assert replaced.found is None
+    assert not rig.core.in_control
+
+
+def test_what_it_flies_before_a_waypoint_of_ours_or_after_our_stop_is_no_strangers_velocity() -> None:
+    rig = Rig("ardupilot").flying()
+    rig.peer.target = None
+    follows(rig, VELOCITY, times=5)  # so it enters the guided mode
+    go(rig)
+    follows(rig, VELOCITY, times=3)  # the waypoint is on its way
+    rig.peer.target = (NORTH, LON, ALT)
+    rig.run(2.0)
+    rig.peer.target = None
+    rig.core.brake(rig.now)
+    rig.run(0.1)
+    rig.say(
+        rig.peer.ack(mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_RESULT_FAILED)
+    )  # so it is told to stand still
+    follows(rig, VELOCITY, times=5)
+    assert rig.of(TargetReplaced) == []
+    assert rig.core.in_control
+
+
+def test_what_another_autopilot_tells_of_its_own_steering_takes_nothing() -> None:
+    rig = searching("px4")
+    follows(rig, VELOCITY, times=5)
+    assert rig.of(TargetReplaced) == []
+
+
 def test_heartbeats_as_ours_that_we_did_not_send_are_told_once_a_minute() -> None:
     rig = Rig().flying()
     other = Peer(system=7, component=191)

@@ -242,6 +242,43 @@ def test_a_ground_station_changes_the_speed_and_the_answer_is_heard(flight: Flig
     assert math.hypot(flight.here.north, flight.here.east) == pytest.approx(15.0, abs=4.0)
 
 
+def test_a_ground_station_pauses_it_until_it_continues(flight: Flight) -> None:
+    flight.go(0, 200, wait=0)
+    flight.listen(4.0)
+    flight.fault("gcs_pauses", seconds=14.0)
+    heard = [each for each in flight.heard(1.0) if each.get_type() == "COMMAND_ACK"]
+    answers = [(each.command, each.result) for each in heard]
+    paused = (M.MAV_CMD_DO_PAUSE_CONTINUE, 0)
+    assert answers == ([paused] if flight.autopilot.firmware.flavor.tells_local_target else [])
+    flight.listen(8.0)
+    assert flight.autopilot.vehicle.body.speed < 0.3
+    if answers:  # a waypoint is taken, and not flown before it continues
+        flight.go(0, 30, wait=0)
+        flight.listen(2.0)
+        assert flight.autopilot.vehicle.body.speed < 0.3
+        flight.listen(25.0)
+        assert flight.here.east == pytest.approx(30.0, abs=2.0)
+
+
+def test_somebody_flies_it_by_a_velocity(flight: Flight) -> None:
+    number = mav.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED
+    flight.long(mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, 5e5)
+    flight.go(0, 60, wait=0)
+    flight.listen(2.0)
+    in_guided = flight.autopilot.firmware.flavor.tells_local_target
+    if in_guided:
+        assert flight.latest["POSITION_TARGET_LOCAL_NED"].type_mask & 0x3F == 0x38
+    flight.fault("gcs_velocity", north=-3.0)
+    flight.listen(1.0)
+    names = [each.get_type() for each in flight.heard(5.0)]
+    assert flight.autopilot.vehicle.body.velocity_north == pytest.approx(-3.0, abs=0.5)
+    if in_guided:
+        assert flight.latest["POSITION_TARGET_LOCAL_NED"].type_mask & 0x3F == 0x07
+        assert "POSITION_TARGET_GLOBAL_INT" not in names
+    else:
+        assert flight.autopilot.firmware.mode == "OFFBOARD"
+
+
 def test_a_second_service_speaks_and_commands(flight: Flight) -> None:
     flight.fault("second_service", component=192, every_s=4.0, north=40.0)
     heard = flight.heard(3.0)

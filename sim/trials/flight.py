@@ -39,6 +39,9 @@ MINUTES = {"uniform": 100, "L": 100, "trail": 100, "height": 600, "mass": 600, "
 """Where the mean of min(T, cap) is cut, in minutes of flight: ten times what the search takes, or more."""
 PROVEN = ("uniform", "L")
 """The scenes for which the bound that counts travel is reckoned: with the paper's priors it takes too long."""
+MORE = 4
+"""One in fifty of what follows a first true hit takes half an hour, and decides the mean: with 640 of them over the
+areas its standard error is as large as what is to be judged there."""
 POINTS = 200
 
 
@@ -54,7 +57,8 @@ class FlightCampaign:
         slow: seeds over which the default in steps, which takes longest, flies the areas and the trail, and for which
             the bound that counts travel is reckoned.
         side: rows, and columns, of the paper's priors.
-        sequels: flights from a first true hit until FOUND, in each flight with false alarms.
+        sequels: flights from a first true hit until FOUND, in each flight with false alarms; over the areas
+            `MORE` times as many.
         stop_below: a flight ends when less than this is undetected, the rest counts as found at the cap.
     """
 
@@ -109,6 +113,12 @@ class FlightCampaign:
                     if planner != IN_STEPS or scene in PAPER or trial < self.seed + self.slow
                 ]
         return jobs
+
+    def sequels_of(self, scene: str, p_tn: float) -> int:
+        """How many are flown in each flight."""
+        if p_tn >= 1.0:
+            return 0
+        return self.sequels * (MORE if scene in PROVEN else 1)
 
     @staticmethod
     def fov(p_tn: float) -> FieldOfView:
@@ -207,7 +217,7 @@ def _flights(campaign: FlightCampaign, job: Job, scene: Scene, p_tn: float) -> l
     fov = campaign.fov(p_tn)
     how = How(
         start=scene.start, fov=fov, stop_below=campaign.stop_below,
-        follow=job.planner in (DEFAULT, IN_STEPS), sequels=campaign.sequels if p_tn < 1.0 else 0,
+        follow=job.planner in (DEFAULT, IN_STEPS), sequels=campaign.sequels_of(job.fov.split()[0], p_tn),
     )  # fmt: skip
     results: list[dict[str, Any]] = []
     flight: TimedFlight | None = None

@@ -12,7 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.trials.campaign import Job
-from sim.trials.flight import DEFAULT, FLIGHT, IN_STEPS, LEAST, PAPER, PLANNERS, SHARES, FlightCampaign, grid
+from sim.trials.flight import (
+    DEFAULT,
+    FLIGHT,
+    IN_STEPS,
+    LEAST,
+    MORE,
+    PAPER,
+    PLANNERS,
+    SHARES,
+    FlightCampaign,
+    grid,
+)
 from sim.trials.journal import write_whole
 from sim.trials.summary import ratio
 
@@ -160,7 +171,8 @@ def _about(campaign: FlightCampaign, whole: bool) -> str:
         f"{size} cells, their hills as wide beside the map as the paper's. *First true detection*: the mean of its "
         "time over all targets and all true detections, exact for the looks and false alarms of the flight. *Until "
         "FOUND*: the time until the target's cell is 0.999 probable, of a flight with the target in it "
-        f"({campaign.sequels} targets a flight). *POS*: when the probability of success is reached. A flight ends when "
+        f"({campaign.sequels} targets a flight, over the areas {MORE} times as many). *POS*: when the probability "
+        "of success is reached. A flight ends when "
         f"less than {campaign.stop_below:g} is undetected; the rest counts as found at the end of the clock, which is "
         "the same for all. A planner that knows no motion flies the same cells with every aircraft. *x of survey*: "
         "the ratio of means over the seeds that both have flown, ± one standard error. *above the bound*: of the first "

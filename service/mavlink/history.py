@@ -47,10 +47,16 @@ class PoseHistory:
         return self._poses[-1] if self._poses else None
 
     def record(self, telemetry: Telemetry) -> None:
-        """Add the pose of a snapshot; one that is not newer than the last is left out."""
+        """Add the pose of a snapshot; one that is older than the last is left out.
+
+        What waited in a buffer is taken in at one time, and the last of it is where the aircraft was then.
+        """
         time = telemetry.position_time
-        if self._times and time <= self._times[-1]:
+        if self._times and time < self._times[-1]:
             return
+        if self._times and time == self._times[-1]:
+            for kept in (self._times, self._boots, self._poses):
+                kept.pop()
         heading = telemetry.heading_deg if math.isfinite(telemetry.heading_deg) else telemetry.yaw_deg
         self._times.append(time)
         self._boots.append(-math.inf if telemetry.boot_time_s is None else telemetry.boot_time_s)

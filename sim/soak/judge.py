@@ -133,7 +133,11 @@ class Judge:
         with self._lock:
             if crashed and not self._crashed:
                 self._crashed = True
-                self._see(f"the aircraft has crashed in {self.state}")
+                by_itself = (
+                    self._not_guided_since < math.inf
+                )  # the autopilot lands it, by a position that jumps
+                if not (by_itself and self.during == "gps_jump"):
+                    self._see(f"the aircraft has crashed in {self.state}")
             self._grounds.append(self._altitude - up - ground.rise(here, hill=self._hill))
             searching = self.state in ("SEARCHING", "CONFIRMING")
             settled = searching and self.steady and (now - self._state_since) * self._speedup > _SETTLED_S

@@ -299,6 +299,17 @@ def test_the_judge_sees_a_crash_once() -> None:
     assert wire.judge.violations == ["the aircraft has crashed in SEARCHING"]
 
 
+@pytest.mark.parametrize(("mode", "seen"), [(PX4_HOLD, 1), (4 << 16 | 6 << 24, 0)], ids=["ours", "it lands"])
+def test_a_landing_of_the_autopilots_own_by_a_position_that_jumps_is_nobody_elses_crash(
+    mode: int, seen: int
+) -> None:
+    wire = Wire()
+    wire.judge.during = "gps_jump"
+    wire.mode(mode)
+    wire.judge.truth(0.0, ground.launch(), wire.now, crashed=True)
+    assert len(wire.judge.violations) == seen
+
+
 def test_violations_are_counted_by_the_fault_that_came_last() -> None:
     wire = Wire()
     wire.judge.during = "home_moved"

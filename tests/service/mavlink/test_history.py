@@ -58,6 +58,20 @@ def test_what_is_not_known_is_none() -> None:
     assert past.pose_at(105.0) is not None
 
 
+def test_of_what_waited_in_a_buffer_the_last_is_where_the_aircraft_was() -> None:
+    old = replace(BASE, position_time=100.0, boot_time_s=50.0)
+    waited = [
+        replace(BASE, position_time=140.0, boot_time_s=60.0 + 15.0 * number, lat=47.0 + 0.0001 * number)
+        for number in range(3)
+    ]
+    past = history(old, *waited)
+    pose = past.pose_at(140.0)
+    assert pose is not None
+    assert pose.lat == pytest.approx(47.0002)
+    assert len(past) == 2
+    assert past.time_of_boot(90.0) == pytest.approx(140.0)
+
+
 def test_the_past_is_bounded() -> None:
     past = history(*(replace(BASE, position_time=100.0 + 0.1 * i) for i in range(5000)), length_s=60.0)
     assert len(past) <= 760

@@ -110,6 +110,7 @@ interface LinkState {
   up: boolean;
   silent_s: number | null;
   received: number | null;
+  round_trip_s: number | null;
 }
 
 interface NewsState {

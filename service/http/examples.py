@@ -108,7 +108,7 @@ STATE = answers(
             "doubt": None,
             "clock": None,
         },
-        "link": {"up": True, "silent_s": 0.4, "received": 0.998},
+        "link": {"up": True, "silent_s": 0.4, "received": 0.998, "round_trip_s": 0.12},
         "detector": {"silent_s": 0.3, "silent": False},
         "regions": [0.28, 0.17, 0.12],
         "drawn": {"number": 1, "words": "region 3 (open ground in the north) appeared"},

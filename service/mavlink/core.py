@@ -86,6 +86,7 @@ class LinkCore(LinkMemory):
         if self.paired:
             self.codec.speaks_v1 = self._hearing.wants_v1(now) or self.codec.speaks_v1
             self._check_silence(now)
+            self._ask_how_long(now)
             self._ask_for_streams(now)
             self._ask_for_parameters(now)
             self._ask_for_reposition(now)
@@ -292,6 +293,9 @@ class LinkCore(LinkMemory):
             self._ack(message, now)
         elif name == "STATUSTEXT":
             self._heard_texts(self._texts.read(message, now), now)
+        elif name == "TIMESYNC":
+            self._round_trip.on_message(message, now)
+            self._show_round_trip(now)
         elif name == "PARAM_VALUE":
             told = self._parameters.read(message.param_id.rstrip("\0"), message.param_value)
             if told is not None:
@@ -352,6 +356,8 @@ class LinkCore(LinkMemory):
         self._heard.base = after = heartbeat(self._heard.base, message, autopilot, now)
         if before.link_lost:
             self._events.append(LinkBack(now, now - before.heartbeat_time))
+            self._round_trip.heard_again(now)
+            self._show_round_trip(now)
             self._streams.start_over()
         if after.mode != before.mode:
             self._mode_changed(autopilot, before.mode, now)
@@ -500,6 +506,7 @@ class LinkCore(LinkMemory):
         if last is None or now - last <= self.settings.stall_s:
             return
         self._stalled_at = now
+        self._round_trip.forget_asked()
         self._events.append(Stalled(now, now - last))
         self._stop_repeating("the service stood still", now)
 
@@ -511,6 +518,17 @@ class LinkCore(LinkMemory):
         self._events.append(LinkLost(now, silent_s))
         self._stop_repeating("the link was lost", now)
         self._done(self._book.cancel("the link was lost", now))
+
+    def _ask_how_long(self, now: float) -> None:
+        question = None if self.telemetry.link_lost else self._round_trip.due(now)
+        if question is not None:
+            self._send(question)
+            self._show_round_trip(now)
+
+    def _show_round_trip(self, now: float) -> None:
+        seconds = self._round_trip.seconds(now)
+        if seconds != self._heard.base.round_trip_s:
+            self._heard.base = replace(self._heard.base, round_trip_s=seconds)
 
     def _ask_for_streams(self, now: float) -> None:
         if self.telemetry.link_lost:

@@ -33,6 +33,7 @@ from service.mavlink.probe import NOWHERE, RepositionProbe
 from service.mavlink.quality import LinkQuality
 from service.mavlink.readiness import Readiness
 from service.mavlink.references import References
+from service.mavlink.roundtrip import RoundTrip
 from service.mavlink.settings import MavlinkSettings
 from service.mavlink.signing import Signer
 from service.mavlink.streams import Streams
@@ -92,6 +93,7 @@ class LinkMemory:
         self._company = Company()
         self._references = References()
         self._hearing = Hearing()
+        self._round_trip = RoundTrip()
         self._probe = RepositionProbe()
         self._control = Control()
         self._cruise = Cruise()
@@ -219,7 +221,7 @@ class LinkMemory:
         now = self._now
         assert now is not None
         if command.goal_mode is not None:
-            until = now + self.settings.mode_window_s
+            until = now + self.settings.mode_window_s + self._round_trip.allowance_s(now)
             if self._control.asked_for(now) or command.goal_mode != self.telemetry.mode:
                 self._strangers.look_away(until)
             self._control.expect(command.goal_mode, until)

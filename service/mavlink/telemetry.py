@@ -113,6 +113,9 @@ class Telemetry:
     target: Target | None = None
     """What POSITION_TARGET_GLOBAL_INT names; its altitude is above home if `target_over_home`."""
     target_over_home: bool = False
+    round_trip_s: float | None = None
+    """What a question takes to the vehicle and its answer back (TIMESYNC); infinite right after a silence, until one is
+    answered; None: it does not answer."""
     steered: bool | None = None
     """Whether the autopilot follows a velocity or the like in its guided mode, and no waypoint."""
     return_height_m: float | None = None

@@ -35,16 +35,26 @@ def position_objections(t: Telemetry, flight: FlightSettings, fresh_s: float) ->
     """Why the position must not be trusted now: GPS_RAW_INT, the estimator's status, the position's age.
 
     The age is counted up to the last heartbeat: when that stays away too, the link is lost, and not the position.
-    `fresh_s` seconds is the most that it may be. `flight.min_satellites` of 0 asks for no GPS at all.
+    `fresh_s` seconds is the most that it may be, and that the link may take there and back: what comes late is old.
+    `flight.min_satellites` of 0 asks for no GPS at all.
     """
     objections: list[str] = []
     age = t.heartbeat_time - t.position_time
     if age > fresh_s:
         objections.append(f"no new position for {age:.0f} s" if math.isfinite(age) else "no position")
+    objections.append(_delay_objection(t.round_trip_s, fresh_s))
     if flight.min_satellites > 0:
         objections.append(_gps_objection(t, flight))
     objections.append(_health_objection(t))
     return [objection for objection in objections if objection]
+
+
+def _delay_objection(round_trip_s: float | None, fresh_s: float) -> str:
+    if round_trip_s is None or round_trip_s <= fresh_s:
+        return ""
+    if math.isinf(round_trip_s):
+        return "the link was silent, and has yet to show how slow it is"
+    return f"the link takes {round_trip_s:.0f} s there and back, and the position may be as old"
 
 
 def _gps_objection(t: Telemetry, flight: FlightSettings) -> str:

@@ -2,6 +2,7 @@
 
 import { percent, tenths } from "./cells.js";
 import { $, draw, lasting, make, say } from "./dom.js";
+import { slow } from "./strip.js";
 
 /** @import { Run } from "./run.js" */
 
@@ -115,6 +116,7 @@ function heard(link) {
       link.silent_s === null ? "not heard yet" : `silent for ${lasting(link.silent_s)}`;
     return [silent, "bad"];
   }
+  if (slow(link)) return [`up, answers after ${lasting(link.round_trip_s ?? 0)}`, "doubtful"];
   if (link.received === null) return ["up", ""];
   const received = `up, ${(100 * link.received).toFixed(0)} % received`;
   return [received, link.received < 0.9 ? "doubtful" : ""];

@@ -16,6 +16,12 @@ function battery({ battery_percent, battery_doubt, flight_left_s }) {
   return [level, left, battery_doubt || low ? "bad" : "", short ? "bad" : ""];
 }
 
+const SLOW_S = 2; // answers that take longer say that a position may be as old
+
+/** Whether what the link carries is late.
+ * @param {LinkState} link */
+export const slow = (link) => (link.round_trip_s ?? 0) > SLOW_S;
+
 /** @param {LinkState | null} link
  * @returns {string[]} */
 function linked(link) {
@@ -24,6 +30,7 @@ function linked(link) {
     const since = link.silent_s === null ? "not heard yet" : `for ${lasting(link.silent_s)}`;
     return ["lost", since, "bad"];
   }
+  if (slow(link)) return ["slow", `answers after ${lasting(link.round_trip_s ?? 0)}`, "doubtful"];
   if (link.received === null) return ["good", "", ""];
   const weak = link.received < 0.9;
   return [weak ? "weak" : "good", `${(100 * link.received).toFixed(0)} %`, weak ? "doubtful" : ""];

@@ -326,7 +326,7 @@ class RunView(BaseView):
     def _link(self) -> LinkState:
         """Whether the autopilot is heard, how long ago, and how much of what it sends arrives."""
         if self.mission is None:
-            return {"up": False, "silent_s": None, "received": None}
+            return {"up": False, "silent_s": None, "received": None, "round_trip_s": None}
         return link_state(self.mission)
 
     def _detector(self) -> DetectorState:
@@ -394,9 +394,11 @@ def pose_of(mission: Mission | None) -> FramePose | None:
 
 def link_state(mission: Mission) -> LinkState:
     """Whether an autopilot is heard, how long ago, and how much of what it sends arrives."""
-    silent = mission.clock.now() - mission.vehicle.telemetry.heartbeat_time
+    telemetry = mission.vehicle.telemetry
+    silent, round_trip = mission.clock.now() - telemetry.heartbeat_time, telemetry.round_trip_s
     return {
         "up": mission.heard(),
         "silent_s": silent if math.isfinite(silent) else None,
         "received": mission.vehicle.received,
+        "round_trip_s": None if round_trip is None or math.isinf(round_trip) else round_trip,
     }

@@ -127,11 +127,13 @@ class WindState(TypedDict):
 
 
 class LinkState(TypedDict):
-    """Whether the autopilot is heard, the seconds since it was, and the part of its last messages that arrived."""
+    """Whether the autopilot is heard, the seconds since it was, the part of its last messages that arrived, and what a
+    question takes there and its answer back (null: it does not answer, or has yet to)."""
 
     up: bool
     silent_s: float | None
     received: float | None
+    round_trip_s: float | None
 
 
 class DetectorState(TypedDict):

@@ -6,6 +6,7 @@ comes from a generator that is handed in, all times are vehicle time.
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -46,6 +47,7 @@ class Radio:
     def __init__(self, trouble: Trouble, source: random.Random, deliver: Callable[[bytes], None]) -> None:
         self.trouble, self._random, self._deliver = trouble, source, deliver
         self._waiting: list[tuple[float, bytes]] = []
+        self._free_at = -math.inf  # when what was put in before has come out, but for what is overtaken
 
     @property
     def busy(self) -> bool:
@@ -62,12 +64,14 @@ class Radio:
             piece = (
                 piece[:where] + bytes([piece[where] ^ (1 + self._random.randrange(255))]) + piece[where + 1 :]
             )
-        late = trouble.delay_s
+        due = self._free_at = max(
+            now + trouble.delay_s, self._free_at
+        )  # a link that is fast again is a queue yet
         if trouble.reorder and chance() < trouble.reorder:
-            late += _REORDER_S
+            due += _REORDER_S
         for _ in range(2 if trouble.duplicate and chance() < trouble.duplicate else 1):
-            if late > 0 or self._waiting:
-                self._waiting.append((now + late, piece))
+            if due > now or self._waiting:
+                self._waiting.append((due, piece))
             else:
                 self._deliver(piece)
 

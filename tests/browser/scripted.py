@@ -73,7 +73,8 @@ class Scripted(FakeRun):
         self.tell(
             pose={**here, **still}, height_above_ground_m=36.0, wind={"speed_mps": 5.2, "from_deg": 250.0},
             battery_percent=81.0, flight_left_s=1260.0, pos=0.21, regions=self.view.region_masses(),
-            link={"up": True, "silent_s": 0.2, "received": 0.99}, detector={"silent_s": 0.4, "silent": False},
+            link={"up": True, "silent_s": 0.2, "received": 0.99, "round_trip_s": 0.1},
+            detector={"silent_s": 0.4, "silent": False},
             ahead=[(56.6081, -4.7421), (56.6088, -4.743), RUIN], mode="AUTO_LOITER",
         )  # fmt: skip
         self.be(State.SEARCHING)

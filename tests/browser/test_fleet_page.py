@@ -31,7 +31,8 @@ def craft(search: Scripted, number: int, state: State, **changes: Any) -> dict[s
         "name": str(number), "colour": number - 1, "state": state, "words": STATE_WORDS[state], "why": "",
         "orders": orders(state),
         "lat": lat, "lon": lon, "height": 20.0 + 10.0 * number, "heading_deg": 90.0 * number, "battery": 90.0 - number,
-        "link": {"up": True, "silent_s": 0.2, "received": 0.99}, "mode": "AUTO_LOITER", "next": search.now["next"],
+        "link": {"up": True, "silent_s": 0.2, "received": 0.99, "round_trip_s": 0.1},
+        "mode": "AUTO_LOITER", "next": search.now["next"],
         "ahead": [(lat, lon), PHONE_FIX if number < 3 else RUIN], "steps": 3, "flight_time_s": 60.0,
         "pose": None, "footprint": search.now["footprint"],
     }  # fmt: skip
@@ -77,7 +78,12 @@ def test_each_aircraft_has_a_panel_with_its_state_battery_and_height(watch: Watc
     expect(panel(watch, "1")).to_contain_text("Battery89 %Height30 mLinkgood")
     expect(panel(watch, "2").locator(".bad")).to_have_text("19 %")
     expect(panel(watch, "3").locator(".chip")).to_have_text(STATE_WORDS[State.HOLDING])
-    fly_three(search.run, link={"up": False, "silent_s": 9.0, "received": None}, battery=None, height=None)
+    fly_three(
+        search.run,
+        link={"up": False, "silent_s": 9.0, "received": None, "round_trip_s": 0.1},
+        battery=None,
+        height=None,
+    )
     expect(panel(watch, "3")).to_contain_text("BatteryunknownHeightunknownLinklost")
     colours = watch.page.locator("#fleet .swatch").evaluate_all(
         "(all) => all.map((each) => getComputedStyle(each).backgroundColor)"

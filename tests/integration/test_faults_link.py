@@ -32,6 +32,22 @@ def test_a_bad_radio_does_not_keep_the_search_from_its_target(tmp_path: Path) ->
     assert report["position"]["lat"] == pytest.approx(47.0508, abs=3e-4)
 
 
+@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
+def test_over_a_link_that_has_become_slow_nothing_is_flown(flavor: str, tmp_path: Path) -> None:
+    """All that it carries looks fresh: heartbeats come each second, and are as old as the link is slow."""
+    with flight(tmp_path, flavor, speedup=4.0, silent_after_s=60.0) as scene:
+        scene.searching()
+        scene.control.fault("packets", delay_s=5.0)
+        scene.reaches("HOLDING", "the link takes", "the autopilot is silent")
+        scene.fly(20.0)
+        assert scene.state() == "HOLDING"
+        assert scene.door.get("/api/state").json()["link"]["round_trip_s"] > 8.0
+        scene.sends_nothing(10.0)
+        scene.control.clear("packets")
+        scene.reaches("SEARCHING", "good again", "is heard again")
+        scene.moves_again()
+
+
 def test_lost_acknowledgements_do_not_keep_the_search_from_its_target(tmp_path: Path) -> None:
     with flight(tmp_path, target=TARGET) as scene:
         scene.control.fault("acks_lost")

@@ -218,7 +218,8 @@ class Rig:
         return [
             m
             for m in self.sent
-            if m.get_type() not in ("HEARTBEAT", "STATUSTEXT") and getattr(m, "command", None) not in quiet
+            if m.get_type() not in ("HEARTBEAT", "STATUSTEXT", "TIMESYNC")
+            and getattr(m, "command", None) not in quiet
         ]
 
 

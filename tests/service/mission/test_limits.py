@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -47,7 +48,7 @@ def moved(t: Telemetry, seconds: float, north_m: float) -> Telemetry:
 
 def test_nothing_speaks_against_a_good_position() -> None:
     assert position_objections(GOOD, FLIGHT, FRESH_S) == []
-    uncounted = replace(GOOD, satellites=None, horizontal_accuracy_m=0.9, estimator_ok=None)
+    uncounted = replace(GOOD, satellites=None, horizontal_accuracy_m=0.9, estimator_ok=None, round_trip_s=1.5)
     assert position_objections(uncounted, FLIGHT, FRESH_S) == []
 
 
@@ -64,6 +65,8 @@ def test_nothing_speaks_against_a_good_position() -> None:
         ({"sensors_failed": ("compass",)}, "not healthy: compass"),
         ({"position_time": 97.0}, "no new position for 3 s"),
         ({"position_time": Telemetry().position_time}, "no position"),
+        ({"round_trip_s": 4.2}, "the link takes 4 s there and back"),
+        ({"round_trip_s": math.inf}, "has yet to show how slow it is"),
     ],
 )
 def test_each_fault_of_the_position_is_named(change: dict[str, Any], words: str) -> None:

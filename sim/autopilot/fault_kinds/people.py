@@ -100,15 +100,16 @@ def _gcs_speed(a: Host, options: Options) -> None:
 
 def _gcs_pauses(a: Host, options: Options) -> None:
     """As ground stations do: PX4 is sent nowhere, and nothing of that is on our wire; ArduCopter pauses."""
-    if a.firmware.flavor.pauses_by == M.MAV_CMD_DO_REPOSITION:
-        nowhere = (math.nan,) * 4
-        a.firmware.handle(ReceivedCommand(M.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, *nowhere, None))
-    else:
+    if a.firmware.flavor.pauses_by == M.MAV_CMD_DO_PAUSE_CONTINUE:
         _answered(a, M.MAV_CMD_DO_PAUSE_CONTINUE, 0.0)
+        return
+    nowhere = (math.nan,) * 4
+    a.firmware.handle(ReceivedCommand(M.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, *nowhere, None))
 
 
 def _gcs_continues(a: Host, options: Options) -> None:
-    _answered(a, M.MAV_CMD_DO_PAUSE_CONTINUE, 1.0)
+    if a.firmware.flavor.pauses_by == M.MAV_CMD_DO_PAUSE_CONTINUE:
+        _answered(a, M.MAV_CMD_DO_PAUSE_CONTINUE, 1.0)
 
 
 def _gcs_velocity(a: Host, options: Options) -> None:

@@ -371,9 +371,13 @@ class MissionCore:
             case Hold(cause=cause) if self.standing.state in _BEFORE_FLIGHT and cause != "operator":
                 pass  # nothing of ours moves yet, and what is at fault is waited for anyway
             case Hold(cause=cause, reason=reason):
-                again = self.standing.state == State.HOLDING and cause == "operator"  # it may not stand yet
+                holds = self.standing.state == State.HOLDING
+                again = holds and cause == "operator"  # it may not stand yet
                 if self._happen(Happen(Event.HOLD, reason)) or (again and self._seen.telemetry.in_control):
                     self._stop()
+                if holds and cause not in self.standing.causes:
+                    self._emit(Note(f"it hovers for another reason too: {reason}", _WARNING))
+                    self._change(why=one_more(self.standing.why, reason))
                 if self.standing.state == State.HOLDING:
                     self._change(causes=self.standing.causes | {cause})
             case Release():

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 
 from service.mavlink.events import LinkLost, Stalled, Target, TargetNotTaken
 from service.mavlink.telemetry import Home
-from service.mission.effects import Land, ReturnToLaunch, Stop
+from service.mission.effects import Land, Note, ReturnToLaunch, Stop
 from service.mission.news import Judged, NotStopped, Order
 from service.mission.states import State
 from sim.soak import ground
@@ -40,6 +41,23 @@ def test_after_a_silence_it_may_have_to_wait_for_an_operator() -> None:
     talk.silent.clear()
     talk.pass_by(60.0)
     assert (talk.state, talk.core.standing.causes) == (State.HOLDING, {"operator"})
+
+
+def test_after_a_silence_it_hovers_until_the_link_has_shown_how_slow_it_is_and_says_so() -> None:
+    talk = silenced()
+    talk.silent.clear()
+    talk.shows(round_trip_s=math.inf)
+    did = talk.pass_by(30.0)
+    assert talk.core.standing.causes == {"position"}
+    assert "silent" in talk.core.standing.why
+    assert "has yet to show how slow it is" in talk.core.standing.why
+    assert sum("for another reason too" in each.text for each in did if isinstance(each, Note)) == 1
+    talk.shows(round_trip_s=8.0)
+    talk.pass_by(30.0)
+    assert talk.state == State.HOLDING
+    talk.shows(round_trip_s=0.3)
+    talk.pass_by(30.0)
+    assert talk.state == State.SEARCHING
 
 
 def test_a_stop_that_may_have_been_lost_is_sent_again_once() -> None:

@@ -7,7 +7,6 @@ the vehicle's own time stamps, whose clock may run at another pace (a simulator'
 from __future__ import annotations
 
 import math
-from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -22,21 +21,24 @@ class RoundTrip:
     """The questions that are on their way, and what the last answer has shown."""
 
     def __init__(self) -> None:
-        self._asked: deque[tuple[int, float]] = deque(maxlen=_ASKED)
-        self._took_s, self._answered_at = 0.0, -math.inf
+        self._asked: dict[int, float] = {}
+        self._asked_at = self._answered_at = -math.inf
+        self._took_s = 0.0
 
     def due(self, now: float) -> Message | None:
         """The next question, once it is time for one."""
-        if self._asked and 0.0 <= now - self._asked[-1][1] < _PERIOD_S:
+        if 0.0 <= now - self._asked_at < _PERIOD_S:
             return None
-        stamp = round(now * 1e9)
-        self._asked.append((stamp, now))
+        stamp, self._asked_at = round(now * 1e9), now
+        self._asked[stamp] = now
+        while len(self._asked) > _ASKED:
+            del self._asked[next(iter(self._asked))]
         return mavlink.MAVLink_timesync_message(0, stamp)
 
     def on_message(self, message: Message, now: float) -> None:
-        """TIMESYNC of the autopilot: an answer to one of ours, or a question of its own, which says nothing."""
-        sent = dict(self._asked).get(message.ts1)
-        if message.tc1 != 0 and sent is not None:
+        """TIMESYNC of the autopilot: an answer to one of ours, or a question of its own, which says nothing. Of an
+        answer that comes twice, by two ways, the faster one counts."""
+        if message.tc1 != 0 and (sent := self._asked.pop(message.ts1, None)) is not None:
             self._took_s, self._answered_at = now - sent, now
 
     def heard_again(self, now: float) -> None:

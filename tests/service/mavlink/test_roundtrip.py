@@ -48,6 +48,17 @@ def test_the_autopilots_own_questions_and_others_answers_say_nothing() -> None:
     assert rig.core.telemetry.round_trip_s is None
 
 
+def test_of_an_answer_that_comes_by_two_ways_the_faster_one_counts() -> None:
+    rig = Rig("px4").flying()
+    rig.run(1.0)
+    (*_, last) = rig.messages("TIMESYNC")
+    answer = mavlink.MAVLink_timesync_message(12345, last.ts1)
+    rig.say(rig.peer.pack(answer))
+    rig.run(4.0)
+    rig.say(rig.peer.pack(answer))
+    assert rig.core.telemetry.round_trip_s == pytest.approx(0.0, abs=1.1)
+
+
 def test_an_answer_that_waited_while_we_stood_still_says_nothing_about_the_link() -> None:
     rig = Rig("px4").flying()
     answers(rig, 0.2, 5.0)

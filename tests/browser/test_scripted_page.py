@@ -69,6 +69,9 @@ def test_the_strip_says_it_in_words_and_what_happens_next(watch: Watch, search: 
     expect(strip.locator(".bad")).to_have_text(["19 %", "2 min left"])
     expect(strip).to_contain_text("Heightunknown")
     expect(strip).to_contain_text("Windunknown")
+    search.run.tell(link={"up": True, "silent_s": 0.2, "received": 0.99, "round_trip_s": 5.2})
+    expect(strip).to_contain_text("Linkslowanswers after 5 s")
+    expect(page.locator("#facts")).to_contain_text("up, answers after 5 s")
 
 
 def test_what_cannot_be_seen_from_the_air_is_named_with_the_likeliest_first(

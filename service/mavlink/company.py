@@ -57,6 +57,10 @@ class Company:
             return ""
         return self._sign(f"another program commands as this service ({command_name(number)})", now)
 
+    def not_ours(self, number: int, now: float) -> bool:
+        """Whether an answer that names nobody, as all of MAVLink 1 do, is to a command that we have not sent lately."""
+        return now - self._sent.get(number, -math.inf) > _LATELY_S
+
     def commander(self, now: float) -> str:
         """Who has moved the aircraft lately, as a sentence's subject."""
         at, who = self._other

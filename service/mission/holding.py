@@ -13,6 +13,7 @@ from service.mission.standing import Look
 from service.mission.states import Event
 
 BLIND = {"link", "position", "air"}  # causes of a hold during which no waypoint of ours leads home
+UNHINDERED = {"operator", "apart"}  # causes that say nothing against our own way home
 UNSURE = {"position", "air"}  # what the aircraft's own word ends
 _GOOD = {"position": "the position is good", "air": "the autopilot says that it is in the air"}
 CLIMB_AGAIN_S = 5.0
@@ -50,7 +51,9 @@ class Holding(Phase):
             if not on_ground(t):  # a climb that was broken off in time: what stands disarmed needs no stop
                 yield Stop()
         if low and look.heard() and t.in_control:  # which needs no position, nor a journal
-            direct = standing.homeward or bool(causes & BLIND)
+            # by itself it goes past no others: not where nothing speaks against the way that it was on
+            unflown = standing.homeward and not causes <= UNHINDERED
+            direct = unflown or bool(causes & BLIND)
             yield Happen(Event.ENERGY_LOW, low, stopped=low, searched=True, direct=direct)
         elif "detector" in causes and not look.detector_silent():
             yield Release("detector", "the detector reports again")

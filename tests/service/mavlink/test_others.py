@@ -245,6 +245,19 @@ def test_what_another_autopilot_tells_of_its_own_steering_takes_nothing() -> Non
     assert rig.of(TargetReplaced) == []
 
 
+@pytest.mark.parametrize(
+    ("command", "theirs"), [(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, True), (REPOSITION, False)]
+)
+def test_an_answer_that_names_nobody_is_somebody_elses_where_we_have_not_asked(
+    command: int, theirs: bool
+) -> None:
+    """MAVLink 1 has no room for whom an answer is for."""
+    rig = searching("ardupilot")
+    rig.say(rig.peer.ack(command, mavlink.MAV_RESULT_ACCEPTED, target=(0, 0)))
+    assert len(rig.of(TargetReplaced)) == theirs
+    assert rig.core.in_control != theirs
+
+
 def test_heartbeats_as_ours_that_we_did_not_send_are_told_once_a_minute() -> None:
     rig = Rig().flying()
     other = Peer(system=7, component=191)

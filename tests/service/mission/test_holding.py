@@ -165,6 +165,15 @@ def test_an_autopilot_that_does_not_know_the_way_home_lands() -> None:
     assert talk.doing() == Land()
 
 
+def test_an_operators_hold_on_the_way_home_ends_in_the_same_way_home_which_goes_past_the_others() -> None:
+    talk = reached(State.RETURNING)
+    talk.on(Order("hold"))
+    talk.pass_by(2.0)
+    talk.shows(battery_percent=18.0)
+    talk.pass_by(2.0)
+    assert (talk.state, talk.core.standing.direct) == (State.RETURNING, False)
+
+
 def test_a_slow_journal_holds_and_its_energy_leads_home_all_the_same() -> None:
     talk = searching()
     talk.sees(journal_behind_s=3.0)

@@ -24,6 +24,8 @@ _METRES_PER_DEGREE = 111_194.93
 GAP_M = 6.5
 """Of a layer of 10 m; what flies about its height may leave a little less than it is allowed to plan with."""
 STANDS_S, STILL_MPS = 8.0, 1.0
+NEARER_M = 1.0
+"""Who is given back too near to another one may come so much nearer before they are apart: what hovers sways."""
 EVERY_S = 0.01  # wall time
 
 
@@ -45,6 +47,9 @@ class Separation:
         """Who may be flown by somebody else just now, a pilot or a failsafe: it goes where it goes, and whoever comes
         too near to it has to stand still within STANDS_S."""
         self._since: dict[tuple[str, str], float] = {}
+        self._given_back: dict[
+            tuple[str, str], float
+        ] = {}  # as near as others had brought a pair: it comes no nearer
         self.together = 0
         """Moments at which two were in the air, which is when there was something to judge."""
 
@@ -76,12 +81,18 @@ class Separation:
         gap, metres = max(abs(each["up"] - b["up"]) for each in around), _apart_m(a, b)
         if gap >= self._gap_m or metres >= 2.0 * self._separation_m:
             self._near.pop((first, second), None)
+            self._given_back.pop((first, second), None)
             return
         self.nearest_m = min(self.nearest_m, metres)
         if metres >= self._separation_m:
             self._since.pop((first, second), None)
+            self._given_back.pop((first, second), None)
             return
-        if self.taken & {first, second} and self._stands((first, second), around[1], b):
+        if self.taken & {first, second}:
+            if self._stands((first, second), around[1], b):
+                self._given_back[first, second] = metres
+                return
+        elif metres > self._given_back.get((first, second), math.inf) - NEARER_M:
             return
         said = (
             f"aircraft {first} and {second} were {metres:.1f} m apart, {a['up']:.1f} and {b['up']:.1f} m high"

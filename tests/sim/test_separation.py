@@ -59,6 +59,19 @@ def test_beside_one_that_somebody_else_flies_the_other_has_to_stand_soon(speed: 
         assert bool(judge.violations) == (guilty and now > 8.0)
 
 
+@pytest.mark.parametrize(("then", "guilty"), [(14.5, False), (13.0, True)])
+def test_who_is_given_back_too_near_to_another_one_comes_no_nearer(then: float, guilty: bool) -> None:
+    judge = Separation()
+    judge.taken = frozenset({"1"})
+    judge.see({"1": state(0.0, 30.0), "2": state(15.0, 30.0)})
+    judge.taken = frozenset()
+    judge.see({"1": state(0.0, 30.0), "2": state(then, 30.0)})
+    assert bool(judge.violations) == guilty
+    judge.see({"1": state(0.0, 30.0), "2": state(50.0, 30.0)})
+    judge.see({"1": state(0.0, 30.0), "2": state(15.0, 30.0)})
+    assert len(judge.violations) == guilty + 1  # apart once, they stay so
+
+
 def test_who_has_flown_on_between_two_answers_is_judged_by_where_it_surely_was() -> None:
     """On a busy machine the second is asked late: by then the first has flown from 40 m away to 10 m beyond it."""
     judge = Separation()

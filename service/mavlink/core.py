@@ -470,7 +470,7 @@ class LinkCore(LinkMemory):
     def _steered(self, now: float) -> None:
         t = self.telemetry
         flies = t.in_control and t.guided and t.armed and t.landed_state == "in_air"
-        if flies and self._strangers.on_steered(bool(t.steered), now):
+        if flies and self._strangers.on_steered(t.steered_mps, now):
             self._replaced(None, self._company.commander(now), now)
 
     def _replaced(self, found: Target | None, by: str, now: float) -> None:

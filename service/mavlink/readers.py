@@ -182,10 +182,12 @@ def _position_target(m: KnownFields) -> Fields:
 
 
 def _local_target(m: KnownFields) -> Fields:
-    """ArduCopter tells by the mask what its guided mode follows: a place alone is a waypoint."""
+    """ArduCopter tells by the mask what its guided mode follows: a place alone is a waypoint; and how fast it is to go
+    otherwise."""
     mask = m.flags("type_mask")
     waypoint = not mask & _IGNORES_POSITION and mask & _IGNORES_VELOCITY == _IGNORES_VELOCITY
-    return {"steered": not waypoint}
+    speed = math.hypot(*(m.read(name) or 0.0 for name in ("vx", "vy", "vz")))
+    return {"steered_mps": None if waypoint else speed}
 
 
 def _rc_channels(m: KnownFields) -> Fields:

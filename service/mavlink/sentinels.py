@@ -92,7 +92,12 @@ FIELDS: Mapping[str, Mapping[str, FieldRule]] = {
     },  # an estimator without a wind says exactly 0
     "ESTIMATOR_STATUS": {"flags": _FLAGS},
     "EKF_STATUS_REPORT": {"flags": _FLAGS},
-    "POSITION_TARGET_LOCAL_NED": {"type_mask": _FLAGS},
+    "POSITION_TARGET_LOCAL_NED": {
+        "type_mask": _FLAGS,
+        "vx": FieldRule(),
+        "vy": FieldRule(),
+        "vz": FieldRule(),
+    },
     "POSITION_TARGET_GLOBAL_INT": {
         "coordinate_frame": _FLAGS,
         "type_mask": _FLAGS,

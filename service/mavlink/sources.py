@@ -50,7 +50,7 @@ SOURCES: Mapping[str, Source] = {
     "GLOBAL_POSITION_INT": Source(_POSITION, 10.0, 2.0),
     "EXTENDED_SYS_STATE": Source(("landed_state",), 2.0, 5.0),
     "POSITION_TARGET_GLOBAL_INT": Source(("target", "target_over_home"), 2.0, 5.0),
-    "POSITION_TARGET_LOCAL_NED": Source(("steered",), 2.0, 5.0, optional=True, only=_ARDUPILOT),
+    "POSITION_TARGET_LOCAL_NED": Source(("steered_mps",), 2.0, 5.0, optional=True, only=_ARDUPILOT),
     "ATTITUDE": Source(("yaw_deg", "heading_deg", "roll_deg", "pitch_deg"), 10.0, 1.0),
     "SYS_STATUS": Source((*_BATTERY, "prearm_ok", "sensors_failed"), 1.0, 5.0),
     "BATTERY_STATUS": Source(_BATTERY, 1.0, 10.0),

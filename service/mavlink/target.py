@@ -28,6 +28,7 @@ _REFUSAL_S = 0.5
 _REPLACED_AFTER = 2
 _SETTLED_AFTER = 3
 _SUSPECTED_S = 5.0
+_STANDS_MPS = 0.1
 _OVERTAKES_S = (
     1.0  # so long may a waypoint be on its way, while the autopilot names what somebody else gave it before
 )
@@ -138,10 +139,12 @@ class Strangers:
         self._suspect, self._times_suspect = None, 0
         return overtaken
 
-    def on_steered(self, steered: bool, now: float) -> bool:
-        """The autopilot tells whether it flies a velocity or a place; whether it is sure that somebody has begun to
-        steer it, where it flew to a place of ours."""
-        theirs = steered and self._named is not None and now >= self._off_until
+    def on_steered(self, speed_mps: float | None, now: float) -> bool:
+        """The autopilot tells how fast it is to go where it has no place to go to (None: it has one); whether it is
+        sure that somebody steers it. We ask for a stand at most, and so does the mode when it is entered: a speed of
+        nothing is somebody else's only where it flew to a place of ours before."""
+        steered = speed_mps is not None and (self._named is not None or speed_mps > _STANDS_MPS)
+        theirs = steered and now >= self._off_until
         self._times_steered = self._times_steered + 1 if theirs else 0
         return self._times_steered >= _REPLACED_AFTER
 

@@ -116,8 +116,9 @@ class Telemetry:
     round_trip_s: float | None = None
     """What a question takes to the vehicle and its answer back (TIMESYNC); infinite right after a silence, until one is
     answered; None: it does not answer."""
-    steered: bool | None = None
-    """Whether the autopilot follows a velocity or the like in its guided mode, and no waypoint."""
+    steered_mps: float | None = None
+    """How fast the autopilot is to go where its guided mode follows a velocity or the like; None: it has a waypoint, or
+    does not tell."""
     return_height_m: float | None = None
     """How high above home the autopilot flies home by itself, as its parameter says; None: not told."""
     most_speed_mps: float | None = None

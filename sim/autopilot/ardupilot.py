@@ -256,8 +256,9 @@ class ArduCopter(Firmware):
         return ACCEPTED
 
     @property
-    def steered(self) -> bool:
-        return self.mode == "GUIDED" and self.vehicle.behaviour is self._setpoints
+    def steered(self) -> tuple[float, float, float] | None:
+        follows = self.mode == "GUIDED" and self.vehicle.behaviour is self._setpoints
+        return self._setpoints.velocity if follows else None
 
     def on_mission_start(self, command: ReceivedCommand) -> Results:
         if len(self.plan.mission) < 2 or not self.vehicle.armed:

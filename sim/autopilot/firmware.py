@@ -352,9 +352,9 @@ class Firmware(ABC):
         return altitude - self.vehicle.ground_amsl
 
     @property
-    def steered(self) -> bool:
-        """Whether it flies a velocity that somebody gives it, and to no place."""
-        return False
+    def steered(self) -> tuple[float, float, float] | None:
+        """The velocity (north, east, up) that somebody gives it, where it flies that and to no place."""
+        return None
 
     def target_or_seen(self) -> Point:
         """Where it is going, or where it is."""

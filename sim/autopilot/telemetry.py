@@ -235,7 +235,7 @@ def position_target_global_int(a: Host) -> Any | None:
     """POSITION_TARGET_GLOBAL_INT: the final target at once, altitude AMSL."""
     target = a.firmware.target_or_seen()
     frame, mask, stays_silent = a.firmware.flavor.target_fields
-    if (stays_silent and not a.vehicle.flying) or a.firmware.steered:
+    if (stays_silent and not a.vehicle.flying) or a.firmware.steered is not None:
         return None
     latitude, longitude = a.vehicle.frame.to_e7(target.north, target.east)
     return M.MAVLink_position_target_global_int_message(
@@ -249,11 +249,10 @@ def position_target_local_ned(a: Host) -> Any | None:
         return None
     position, rest = 0x0007, 0x0C00  # what is ignored: the yaw always
     frame = M.MAV_FRAME_LOCAL_NED
-    if a.firmware.steered:
-        demanded = a.vehicle.body
-        velocity = demanded.velocity_north, demanded.velocity_east, -demanded.velocity_up
+    if a.firmware.steered is not None:
+        north, east, up = a.firmware.steered
         return M.MAVLink_position_target_local_ned_message(
-            a.time_ms, frame, position | rest, 0.0, 0.0, 0.0, *velocity, *(0.0,) * 5
+            a.time_ms, frame, position | rest, 0.0, 0.0, 0.0, north, east, -up, *(0.0,) * 5
         )
     target, origin = a.firmware.target_or_seen(), a.vehicle.origin
     place = target.north - origin.north, target.east - origin.east, origin.up - target.up

@@ -192,12 +192,12 @@ def test_who_gave_it_is_named_when_the_answer_to_it_was_heard() -> None:
     assert replaced.by == "system 255, component 190 (DO_REPOSITION)"
 
 
-def follows(rig: Rig, mask: int, times: int = 1) -> None:
+def follows(rig: Rig, mask: int, times: int = 1, north: float = 0.0) -> None:
     """ArduCopter tells what its guided mode follows."""
     for _ in range(times):
         rig.run(0.5)
         message = mavlink.MAVLink_position_target_local_ned_message(
-            rig.peer.boot_ms(rig.now), mavlink.MAV_FRAME_LOCAL_NED, mask, *[0.0] * 11
+            rig.peer.boot_ms(rig.now), mavlink.MAV_FRAME_LOCAL_NED, mask, 0.0, 0.0, 0.0, north, *[0.0] * 7
         )
         rig.say(rig.peer.pack(message))
 
@@ -237,6 +237,16 @@ def test_what_it_flies_before_a_waypoint_of_ours_or_after_our_stop_is_no_strange
     follows(rig, VELOCITY, times=5)
     assert rig.of(TargetReplaced) == []
     assert rig.core.in_control
+
+
+def test_who_steers_it_somewhere_takes_it_before_a_waypoint_of_ours_is_named_too() -> None:
+    rig = Rig("ardupilot").flying()
+    rig.peer.target = None
+    go(rig)
+    follows(rig, VELOCITY, north=2.0)
+    assert rig.of(TargetReplaced) == []
+    follows(rig, VELOCITY, north=2.0)
+    assert len(rig.of(TargetReplaced)) == 1
 
 
 def test_what_another_autopilot_tells_of_its_own_steering_takes_nothing() -> None:

@@ -47,9 +47,8 @@ class Separation:
         """Who may be flown by somebody else just now, a pilot or a failsafe: it goes where it goes, and whoever comes
         too near to it has to stand still within STANDS_S."""
         self._since: dict[tuple[str, str], float] = {}
-        self._given_back: dict[
-            tuple[str, str], float
-        ] = {}  # as near as others had brought a pair: it comes no nearer
+        # as near as others had brought a pair, in metres: it comes no nearer
+        self._given_back: dict[tuple[str, str], float] = {}
         self.together = 0
         """Moments at which two were in the air, which is when there was something to judge."""
 

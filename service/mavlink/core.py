@@ -403,9 +403,8 @@ class LinkCore(LinkMemory):
         us = (self.codec.system_id, self.codec.component_id)
         reason = self._company.on_ack(message, ours=named == us, now=now) if named[1] else ""
         self._tell_another(reason, now)
-        unnamed = (
-            named == (0, 0) and message.command in TAKES and self._company.not_ours(message.command, now)
-        )
+        command = message.command
+        unnamed = named == (0, 0) and command in TAKES and self._company.not_ours(command, now)
         if unnamed or named not in ((0, 0), (us[0], 0), us):
             t, accepted = self.telemetry, message.result == mavlink.MAV_RESULT_ACCEPTED
             if accepted and message.command in TAKES and t.in_control and t.guided and t.armed:

@@ -64,9 +64,8 @@ class Radio:
             piece = (
                 piece[:where] + bytes([piece[where] ^ (1 + self._random.randrange(255))]) + piece[where + 1 :]
             )
-        due = self._free_at = max(
-            now + trouble.delay_s, self._free_at
-        )  # a link that is fast again is a queue yet
+        # a link that is fast again has a queue yet
+        due = self._free_at = max(now + trouble.delay_s, self._free_at)
         if trouble.reorder and chance() < trouble.reorder:
             due += _REORDER_S
         for _ in range(2 if trouble.duplicate and chance() < trouble.duplicate else 1):

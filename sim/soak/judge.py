@@ -133,10 +133,8 @@ class Judge:
         with self._lock:
             if crashed and not self._crashed:
                 self._crashed = True
-                by_itself = (
-                    self._not_guided_since < math.inf
-                )  # the autopilot lands it, by a position that jumps
-                if not (by_itself and self.during == "gps_jump"):
+                # not ours where the autopilot lands it, by a position that jumps
+                if self._not_guided_since == math.inf or self.during != "gps_jump":
                     self._see(f"the aircraft has crashed in {self.state}")
             self._grounds.append(self._altitude - up - ground.rise(here, hill=self._hill))
             searching = self.state in ("SEARCHING", "CONFIRMING")

@@ -29,7 +29,6 @@ from service.telling import Telling
 BEAT_S = 1.0
 _MOST_UNSENT = 1 << 16
 _PR_SET_PDEATHSIG = 1
-_NICENESS = 5  # the flight has three times our share of a busy core
 _OOM, _ENDED_FIRST = Path("/proc/self/oom_score_adj"), 500
 """Where memory runs out, the kernel ends this process, which is started again, and not the flight."""
 _MOST_CHARACTERS = 4000
@@ -81,6 +80,7 @@ async def serve(end: socket.socket, hello: Hello) -> None:
         for task in (listening, beating):
             task.cancel()
         await asyncio.wait([serving, listening, beating])
+        run.end()
         channel.close()
     serving.result()
 
@@ -109,8 +109,6 @@ def main() -> None:
         faulthandler.enable()
     parent = os.getppid()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    with contextlib.suppress(OSError):  # where a sandbox does not let us, the kernel's shares are equal
-        os.nice(_NICENESS)
     with contextlib.suppress(OSError):
         _OOM.write_text(str(_ENDED_FIRST))
     for number in (signal.SIGINT, signal.SIGTERM, *OF_A_TERMINAL):

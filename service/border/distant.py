@@ -1,13 +1,12 @@
 """The run as the door process knows it: asked for over the border, written out here.
 
-What takes long, the texts and pictures of maps, is made in a thread of this process, once for all who ask for it.
+What takes long, the texts and pictures of maps, another process makes (`drawing`), once for all who ask for it.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.border.asking import DEED_S, LOOK_S, Asking
+from service.border.drawing import Drawing, Sight
 from service.border.limits import MOST_FRAMES, MOST_IN_A_FRAME, MOST_NEWS, MOST_ORDERS, MOST_TEXT
 from service.border.memory import SharedMap
 from service.border.rounds import Rounds
@@ -28,7 +28,6 @@ from service.news.request import NewsRequest
 from service.rows import DecisionRow
 from service.telling.searched import POD_AT_LEAST, Outline, outlines
 from service.view.feed import Moment
-from service.view.maps import draw_map, geojson_text, map_text
 from service.view.scene import SearchGround
 from service.view.state import HeardState, RunState
 
@@ -73,10 +72,10 @@ class DistantRun:
         self._orders = asyncio.Semaphore(MOST_ORDERS)
         self._news = asyncio.Semaphore(MOST_NEWS)
         self._waiting = 0
-        self._drawing = ThreadPoolExecutor(1, thread_name_prefix="drawing")
-        self._map = Rounds(lambda: self._draw(map_text_of, digest=True))
-        self._geojson = Rounds(lambda: self._draw(geojson_of))
-        self._picture = Rounds(lambda: self._draw(picture_of))
+        self._drawing = Drawing()
+        self._map = Rounds(lambda: self._draw("map", digest=True))
+        self._geojson = Rounds(lambda: self._draw("geojson"))
+        self._picture = Rounds(lambda: self._draw("picture"))
 
     # ---- looking
 
@@ -169,10 +168,14 @@ class DistantRun:
         self._last = moment
         return _Look(said["ready"], moment, said.get("digest", ""))
 
-    async def _draw(self, draw: Callable[[SearchGround, _Look], bytes], *, digest: bool = False) -> bytes:
+    async def _draw(self, kind: str, *, digest: bool = False) -> bytes:
         look = await self._see(digest=digest)
-        ground, loop = await self._ground_of(look.moment), asyncio.get_running_loop()
-        return await loop.run_in_executor(self._drawing, draw, ground, look)
+        ground = await self._ground_of(look.moment)
+        return await self._drawing.draw(kind, ground, Sight(look.moment, look.digest))
+
+    def end(self) -> None:
+        """Nobody asks any more."""
+        self._drawing.end()
 
     # ---- reports and orders
 
@@ -239,18 +242,3 @@ def _frames(reports: Sequence[Report]) -> Iterator[list[str]]:
         length += len(text)
     if texts:
         yield texts
-
-
-def map_text_of(ground: SearchGround, look: _Look) -> bytes:
-    """The map, cell by cell."""
-    return map_text(ground, look.moment, look.digest)
-
-
-def geojson_of(ground: SearchGround, look: _Look) -> bytes:
-    """The map as GeoJSON."""
-    return geojson_text(ground, look.moment)
-
-
-def picture_of(ground: SearchGround, look: _Look) -> bytes:
-    """The map as a picture."""
-    return draw_map(ground, look.moment)

@@ -118,7 +118,9 @@ class _Doorkeeper:
                     pass_fds=[theirs.fileno(), file, *hello.inherited],
                     env=environment,
                     stdin=DEVNULL,
-                    start_new_session=True,  # Ctrl-C is for the flight, which needs its doors on the way home
+                    # Ctrl-C is for the flight, which needs its doors on the way home. No session of its own: that
+                    # is a group by itself to the kernel's scheduler, and waited up to a second for a busy core
+                    process_group=0,
                 )
             finally:
                 os.close(file)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import importlib.util
 import logging
+import socket
 import ssl
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,9 @@ log = logging.getLogger("roisearch")
 PORTS = {"mqtt": 1883, "mqtts": 8883}
 RETRY_S = 2.0
 _QOS = 1
+_READ_BYTES = 1 << 16
+"""Of the kernel's memory for what the broker sends: the client library reads all that is there before anything else has
+its turn."""
 MOST_BYTES = 1 << 20
 """Of a message; a longer one is not read."""
 MOST_GATHERED = 4 << 20
@@ -57,6 +61,7 @@ class Broker:
             username=self.user,
             password=self.password,
             tls_context=ssl.create_default_context() if self.tls else None,
+            socket_options=[(socket.SOL_SOCKET, socket.SO_RCVBUF, _READ_BYTES)],
             **options,
         )
 

@@ -18,6 +18,7 @@ log = logging.getLogger("roisearch")
 _BUFFER_BYTES = 4 << 20  # a burst waits in the kernel's memory rather than being lost
 _MOST_REPLY_BYTES = 60_000
 _MOST_WAITING = 256  # datagrams; more are dropped: who gets no receipt sends again
+_ANSWERED_AT_ONCE = 4  # datagrams; the flight has taken one in while the next is read
 
 
 def bind_udp(address: str) -> socket.socket:
@@ -44,50 +45,44 @@ def bind_udp(address: str) -> socket.socket:
 
 
 class _Protocol(asyncio.DatagramProtocol):
-    """Hands each datagram to a task of its own."""
+    """Lets datagrams wait for those who answer them."""
 
-    def __init__(self, submit: SubmitAll, group: asyncio.TaskGroup) -> None:
-        self._submit, self._group = submit, group
-        self._transport: asyncio.DatagramTransport | None = None
-        self._waiting = 0
+    def __init__(self) -> None:
+        self.waiting: asyncio.Queue[tuple[bytes, tuple[str, int]]] = asyncio.Queue(_MOST_WAITING)
         self._dropped = False
 
-    def connection_made(self, transport: asyncio.DatagramTransport) -> None:  # type: ignore[override]
-        self._transport = transport
-
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        if self._waiting >= _MOST_WAITING:
+        try:
+            self.waiting.put_nowait((data, addr))
+        except asyncio.QueueFull:
             if not self._dropped:
                 log.warning("more datagrams come than can be taken in: some are dropped, and get no receipt")
             self._dropped = True
-            return
-        self._waiting += 1
-        self._group.create_task(self._answer(data, addr))
 
     def error_received(self, exc: Exception) -> None:
         log.debug("UDP: %s", exc)  # a sender that has closed its socket does not hear its receipts
 
-    async def _answer(self, data: bytes, addr: tuple[str, int]) -> None:
-        try:
-            receipts = await answer(data, self._submit)
-        finally:
-            self._waiting -= 1
-        assert self._transport is not None
+
+async def _answer(protocol: _Protocol, transport: asyncio.DatagramTransport, submit: SubmitAll) -> None:
+    """Answer one datagram after the other. With a task for each, all of them have a turn before an order has its
+    next."""
+    while True:
+        data, sender = await protocol.waiting.get()
+        receipts = await answer(data, submit)
         while receipts:
             end = len(receipts)
             if end > _MOST_REPLY_BYTES:
                 end = receipts.rindex(b"\n", 0, _MOST_REPLY_BYTES) + 1
-            self._transport.sendto(receipts[:end], addr)
+            transport.sendto(receipts[:end], sender)
             receipts = receipts[end:]
 
 
 async def serve_udp(listener: socket.socket, submit: SubmitAll) -> None:
     """Answer datagrams until cancelled."""
-    async with asyncio.TaskGroup() as group:
-        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-            lambda: _Protocol(submit, group), sock=listener
-        )
-        try:
-            await asyncio.get_running_loop().create_future()
-        finally:
-            transport.close()
+    transport, protocol = await asyncio.get_running_loop().create_datagram_endpoint(_Protocol, sock=listener)
+    try:
+        async with asyncio.TaskGroup() as group:
+            for _ in range(_ANSWERED_AT_ONCE):
+                group.create_task(_answer(protocol, transport, submit))
+    finally:
+        transport.close()

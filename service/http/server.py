@@ -25,6 +25,11 @@ from service.view.underlay import NO_UNDERLAY, Underlay, open_underlay
 
 _MOST_HEADER_BYTES = 16_384
 _READ_BYTES = 16_384
+_WISH_BYTES = 1_024
+"""Read at a time of a watcher, which has nothing to say but a time."""
+_ACCEPTED_AT_ONCE = 16
+"""Connections, before whoever is connected already has a turn."""
+_QUEUE_OF_NEWCOMERS = 256
 _KEEP_ALIVE_S = 15
 _SHUTDOWN_S = 2
 _PING_S = 10.0
@@ -110,7 +115,7 @@ class Impatient(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """A client has connected."""
         super().connection_made(transport)
-        transport.max_size = _READ_BYTES  # type: ignore[attr-defined]  # of asyncio's transport; a WebSocket keeps it
+        transport.max_size = _READ_BYTES  # type: ignore[attr-defined]  # of asyncio's transport
         self._address = str(self.client[0]) if self.client else ""
         self.crowd.enter(self, self._address)
         self._watch()
@@ -148,6 +153,7 @@ class Impatient(H11Protocol):
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         """The connection is a WebSocket's from now on."""
+        self.transport.max_size = _WISH_BYTES  # type: ignore[attr-defined]
         self._look_away()
         self._leave()
         super().handle_websocket_upgrade(event)
@@ -199,6 +205,7 @@ class Server(uvicorn.Server):
             ws_max_size=_MOST_HEADER_BYTES,  # all that a watcher ever says is a time to look at
             ws_ping_interval=_PING_S,
             ws_ping_timeout=_PING_S,
+            backlog=_ACCEPTED_AT_ONCE,  # so many are accepted before anything else has its turn
             lifespan="off",
             log_config=None,
             access_log=False,  # a path may hold anything that somebody pasted into it
@@ -215,6 +222,11 @@ class Server(uvicorn.Server):
     def capture_signals(self):  # type: ignore[no-untyped-def]
         """No signal handlers of its own."""
         yield
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to serve; the kernel may keep more newcomers than are accepted at once."""
+        await super().startup(sockets)
+        self._listener.listen(_QUEUE_OF_NEWCOMERS)
 
     async def run_until_told(self) -> None:
         """Serve until `should_exit` is set."""

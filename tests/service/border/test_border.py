@@ -277,3 +277,52 @@ def test_a_killed_service_leaves_no_address_taken(tmp_path: Path) -> None:
                 except OSError:
                     assert time.monotonic() < deadline
                     time.sleep(0.02)
+
+
+def started_by(process: int) -> list[int]:
+    """The processes that a process has started and that still live."""
+    tasks = Path(f"/proc/{process}/task").iterdir()
+    return [int(pid) for task in tasks for pid in (task / "children").read_text().split()]
+
+
+def lives(process: int) -> bool:
+    return Path(f"/proc/{process}").exists()
+
+
+def test_the_doors_share_the_flights_session_and_not_its_terminal(tmp_path: Path) -> None:
+    """A session of its own is a group by itself to the kernel's scheduler: an order waited for a second on a core that
+    others used."""
+
+    async def look() -> tuple[int, int]:
+        async with behind_a_door(Flown(), tmp_path):
+            (door,) = await children()
+            return os.getsid(door), os.getpgid(door)
+
+    session, group = asyncio.run(look())
+    assert session == os.getsid(0)
+    assert group != os.getpgid(0)
+
+
+def test_maps_are_drawn_in_another_process_that_may_end(tmp_path: Path) -> None:
+    """The thread that writes a map would have the interpreter's lock whenever an order wants it."""
+
+    async def talk() -> None:
+        async with behind_a_door(Flown(), tmp_path) as client:
+            (door,) = await children()
+            assert not started_by(door)  # nobody has asked for one yet
+            both = [client.get(path) for path in ("/api/map", "/api/map?format=geojson")]
+            cells, geojson = await asyncio.gather(*both)
+            assert len(cells.json()["probability"]) == Flown().ground.grid.frame.shape[0]
+            assert geojson.json()["type"] == "FeatureCollection"
+            (drawing,) = started_by(door)
+            os.kill(drawing, signal.SIGKILL)
+            said = (await client.get("/api/map")).status_code
+            again = await client.get("/api/map")
+            assert said in {200, 503}
+            assert again.json()["digest"] == cells.json()["digest"]
+            (drawing,) = started_by(door)
+        async with asyncio.timeout(PATIENCE_S):
+            while lives(drawing):  # noqa: ASYNC110 - a process
+                await asyncio.sleep(0.01)
+
+    asyncio.run(talk())

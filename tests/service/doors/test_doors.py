@@ -118,6 +118,43 @@ def test_datagrams_that_cannot_wait_are_dropped_and_the_door_goes_on(
     assert asyncio.run(talk()) <= 256
 
 
+def test_a_flood_of_datagrams_has_few_turns_before_anything_else_has_its_next() -> None:
+    """With a task for each, two hundred datagrams were read between two steps of an order."""
+
+    async def talk() -> int:
+        begun, most = 0, 0
+        go = asyncio.Event()
+
+        async def submit_all(reports: Sequence[Report]) -> list[Receipt]:
+            nonlocal begun, most
+            begun += 1
+            most = max(most, begun)
+            await go.wait()
+            begun -= 1
+            return [Receipt(id=each.id, status="accepted") for each in reports]
+
+        with contextlib.closing(open_doors(DoorSettings(udp="127.0.0.1:0"))) as doors:
+            serving = asyncio.create_task(doors.serve(submit_all))
+            assert doors.udp is not None
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+                client.setblocking(False)
+                client.connect(doors.udp.getsockname())
+                for frame in frames(100):
+                    client.send(lines(frame))
+                for _ in range(200):
+                    await asyncio.sleep(0)
+                go.set()
+                answered: list[dict[str, Any]] = []
+                async with asyncio.timeout(PATIENCE_S):
+                    while len(answered) < 100:
+                        answered += said(await asyncio.get_running_loop().sock_recv(client, 1 << 16))
+            serving.cancel()
+            await asyncio.wait([serving])
+        return most
+
+    assert asyncio.run(talk()) == 4
+
+
 # ---- the Unix socket
 
 

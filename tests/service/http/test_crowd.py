@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import socket
 from typing import Any, get_args
 
 import httpx
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.asyncio.client import connect
 
 from service.evidence.reports import OrderReceipt, OrderRequest
+from service.http.address import split_address
 from service.http.crowd import Crowd
 from service.http.guard import STOPS
 from service.mission.orders import STOPPING
@@ -54,6 +59,52 @@ def test_who_has_asked_for_something_before_outlasts_those_who_never_did() -> No
     for _ in range(20):
         crowd.enter(Guest("a", busy=False, known=True), "a")
     assert operator.gone, "among their like, the longest silent goes"
+
+
+def test_a_storm_of_newcomers_has_few_turns_before_who_is_connected_has_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """asyncio accepts as many at once as may wait; with two thousand of them, an order waited for eight seconds."""
+    entered: list[str] = []
+    monkeypatch.setattr(Crowd, "enter", lambda crowd, connection, address: entered.append(address))
+
+    async def talk() -> list[int]:
+        turns: list[int] = []
+        async with on_a_socket(FakeRun()) as door, contextlib.AsyncExitStack() as storm:
+            for _ in range(200):  # the kernel lets them in, the loop stands still meanwhile
+                storm.enter_context(socket.create_connection(split_address(door.url.removeprefix("http://"))))
+            while sum(turns) < 200:
+                before = len(entered)
+                await asyncio.sleep(0)
+                turns.append(len(entered) - before)
+        return turns
+
+    assert max(asyncio.run(talk())) <= 16
+
+
+def test_a_watcher_is_read_little_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has nothing to say but a time; sixteen that wish thousands of times a second kept an order waiting."""
+    sizes: list[int] = []
+    read = WebSocketsSansIOProtocol.data_received
+
+    def noted(self: WebSocketsSansIOProtocol, data: bytes) -> None:
+        sizes.append(len(data))
+        read(self, data)
+
+    async def talk() -> None:
+        async with (
+            on_a_socket(FakeRun()) as door,
+            connect(door.url.replace("http", "ws", 1) + "/api/events") as watcher,
+        ):
+            await watcher.recv()
+            monkeypatch.setattr(WebSocketsSansIOProtocol, "data_received", noted)
+            watcher.transport.write(b"\x8a\x80\x00\x00\x00\x00" * 2000)  # pongs, which nobody asked for
+            async with asyncio.timeout(30.0):
+                while sum(sizes) < 12_000:  # noqa: ASYNC110 - the other end
+                    await asyncio.sleep(0.01)
+
+    asyncio.run(talk())
+    assert max(sizes) <= 1024
 
 
 def test_an_order_gets_through_four_hundred_half_open_connections() -> None:

@@ -33,6 +33,11 @@ _READ_BYTES = 1 << 16
 its turn."""
 MOST_BYTES = 1 << 20
 """Of a message; a longer one is not read."""
+_NEVER_SENT = 8 << 20
+"""Bytes of a message that a broker of MQTT 5 does not even send us (Maximum Packet Size, section 3.1.2.11.4): the
+client library copies what it gets several times over, and with 54 MB an order waited half a second for that."""
+_SPEAKS_NO_5 = 0x84
+"""What a broker that speaks only older versions is taken to say (Unsupported Protocol Version)."""
 MOST_GATHERED = 4 << 20
 """Bytes of messages that wait while others are answered; what comes then is refused."""
 _RETAINED = "the broker had retained it, so it may be of another day; publish reports without retain"
@@ -108,9 +113,11 @@ async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
     import aiomqtt
 
     told = ""
+    speaks_5 = True
     while True:
         try:
-            async with broker.client(max_queued_incoming_messages=_MOST_QUEUED) as client:
+            options = _short_messages() if speaks_5 else {}
+            async with broker.client(max_queued_incoming_messages=_MOST_QUEUED, **options) as client:
                 granted = await client.subscribe(broker.topic, qos=_QOS)
                 if any(_refused(code) for code in granted):
                     raise aiomqtt.MqttError(f"it refuses the subscription to {broker.topic}; see its rights")
@@ -119,11 +126,30 @@ async def serve_mqtt(broker: Broker, submit: SubmitAll) -> None:
                 await _listen(client, broker, submit)
         except* (aiomqtt.MqttError, OSError) as group:
             reason = str(group.exceptions[0])
-            if reason != told:
+            if speaks_5 and _said_code(group.exceptions[0]) == _SPEAKS_NO_5:
+                speaks_5 = False
+            elif reason != told:
                 log.warning("the MQTT broker %s cannot be used (%s): trying again", broker.url, reason)
             told = reason
             end_if_cancelled()
         await asyncio.sleep(RETRY_S)
+
+
+def _short_messages() -> dict[str, Any]:
+    """Options of a client of MQTT 5 that is sent no message longer than that."""
+    from aiomqtt import ProtocolVersion
+    from paho.mqtt.packettypes import PacketTypes
+    from paho.mqtt.properties import Properties
+
+    properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+    properties.MaximumPacketSize = _NEVER_SENT
+    return {"protocol": ProtocolVersion.V5, "properties": properties}
+
+
+def _said_code(error: BaseException) -> int | None:
+    """The code with which a broker refuses a connection."""
+    code = getattr(error, "rc", None)
+    return code if isinstance(code, int) or code is None else int(code.value)
 
 
 def _refused(code: int | ReasonCode) -> bool:

@@ -14,7 +14,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.models import Example
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST
-from pydantic import Field
+from pydantic import Field, ValidationError, WrapValidator
 from starlette.middleware.cors import CORSMiddleware
 
 from service.complaint import complaint
@@ -41,7 +41,8 @@ At = Annotated[
     Query(description="of a replay: the time to look at, seconds since the epoch", allow_inf_nan=False),
 ]
 Batch = Annotated[list[Report], Field(max_length=MOST_BATCH)]
-"""Bounded before its reports are checked, which takes longer than reading them."""
+Unchecked = WrapValidator(lambda given, _: given)
+"""Described as what it should be, and taken as it comes: `_checked` checks it in turns."""
 
 _MOST_COMPLAINTS = 8
 _MOST_CHARACTERS = 200
@@ -122,12 +123,10 @@ def create_app(
     )
     async def reports(
         request: Request,
-        body: Annotated[Report | Batch, Body(openapi_examples=openapi_examples(EXAMPLES))],
+        body: Annotated[Report | Batch, Unchecked, Body(openapi_examples=openapi_examples(EXAMPLES))],
     ) -> Response:
         only_live()
-        batch = body if isinstance(body, list) else [body]
-        if len(batch) > http.max_batch:
-            raise Refusal(413, f"a batch has at most {http.max_batch} reports")
+        batch = await _checked(body, http.max_batch)
         who = (client_of(request.scope), "reports")
         wait = buckets.take(who, http.reports_per_s, time.monotonic(), len(batch))
         if wait:
@@ -292,6 +291,31 @@ def create_app(
     return app
 
 
+async def _checked(body: Any, most: int) -> list[Report]:
+    """The reports of a request. They are checked one after the other, and others have their turn between: a batch may
+    hold thousands of detections, which takes a tenth of a second.
+
+    Raises RequestValidationError, Refusal.
+    """
+    several = isinstance(body, list)
+    if several and len(body) > most:  # before they are checked, which takes longer than reading them
+        raise Refusal(413, f"a batch has at most {most} reports")
+    reports: list[Report] = []
+    faults: list[Any] = []
+    for number, given in enumerate(body if several else [body]):
+        try:
+            reports.append(Report.model_validate(given))
+        except ValidationError as error:
+            where = ("body", number) if several else ("body",)
+            faults += [{**fault, "loc": (*where, *fault["loc"])} for fault in error.errors()]
+            if len(faults) >= _MOST_COMPLAINTS:
+                break
+        await asyncio.sleep(0)
+    if faults:
+        raise RequestValidationError(faults, body=body)
+    return reports
+
+
 def named_examples(examples: Mapping[str, Any]) -> dict[str, Example]:
     """Examples by what they say."""
     return {name: {"summary": name, "value": value} for name, value in examples.items()}
@@ -305,19 +329,11 @@ def openapi_examples(examples: Mapping[str, Any]) -> dict[str, Example]:
 def complaints(error: RequestValidationError) -> list[dict[str, Any]]:
     """What was wrong with a request, without the input itself: it may hold what JSON cannot say (NaN, half a
     character), be very long, or be a secret that was sent to the wrong place."""
-    # a body may be one report or several; what is wrong with it as the other is no news
-    several = isinstance(error.body, list)
     told = []
-    for found in error.errors():
-        place = list(found["loc"])
-        form = str(place[1]) if len(place) > 1 else ""  # a name that pydantic makes of the model's
-        if "Report" in form:
-            if form.startswith("list[") != several:
-                continue
-            del place[1]
-        shown = [part if isinstance(part, int) else _printable(part) for part in place]
+    for found in error.errors()[:_MOST_COMPLAINTS]:
+        shown = [part if isinstance(part, int) else _printable(part) for part in found["loc"]]
         told.append({"loc": shown, "msg": _printable(complaint(found, field_names())), "type": found["type"]})
-    return told[:_MOST_COMPLAINTS]
+    return told
 
 
 def _printable(text: object) -> str:

@@ -149,6 +149,78 @@ def test_a_message_that_is_too_long_is_refused_without_reading_it(tmp_path: Path
     assert taker.ids == ["f0"]
 
 
+@contextlib.asynccontextmanager
+async def before_5(broker: int) -> AsyncIterator[int]:
+    """A broker that knows MQTT 3.1.1 and nothing later, in front of a real one; its port."""
+
+    async def pass_on(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(ConnectionError), contextlib.closing(writer):
+            while data := await reader.read(1 << 16):
+                writer.write(data)
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        start = await reader.readexactly(9)  # fixed header, 00 04 M Q T T, level
+        if start[8] > 4:
+            writer.write(b"\x20\x02\x00\x01")  # unacceptable protocol version (3.1.1, table 3.1)
+            writer.close()
+            return
+        theirs, ours = await asyncio.open_connection("127.0.0.1", broker)
+        ours.write(start)
+        await asyncio.gather(pass_on(reader, ours), pass_on(theirs, writer))
+
+    async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
+        yield server.sockets[0].getsockname()[1]
+
+
+@needs_mosquitto
+def test_a_broker_that_speaks_an_older_mqtt_is_spoken_to_in_that(tmp_path: Path) -> None:
+    port, taker = free_port(), Taker()
+
+    async def talk() -> None:
+        with mosquitto(tmp_path, port, "allow_anonymous true"):
+            async with (
+                before_5(port) as old,
+                served(taker, mqtt=f"mqtt://127.0.0.1:{old}"),
+                aiomqtt.Client("127.0.0.1", port) as client,
+            ):
+                await client.subscribe("roisearch/reports/receipts", qos=1)
+                await until_answered(client, "roisearch/reports")
+
+    asyncio.run(talk())
+    assert taker.ids == ["f0"]
+
+
+@needs_mosquitto
+def test_what_is_far_too_long_does_not_even_leave_a_broker_of_today(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port, taker, longest = free_port(), Taker(), 0
+    receive = socket.socket.recv
+
+    def noted(self: socket.socket, size: int, flags: int = 0) -> bytes:
+        nonlocal longest
+        longest = max(longest, size)
+        return receive(self, size, flags)
+
+    async def talk() -> None:
+        with mosquitto(tmp_path, port, "allow_anonymous true"):
+            async with (
+                served(taker, mqtt=f"mqtt://127.0.0.1:{port}"),
+                aiomqtt.Client("127.0.0.1", port) as client,
+            ):
+                await client.subscribe("roisearch/reports/receipts", qos=1)
+                await until_answered(client, "roisearch/reports")
+                monkeypatch.setattr(socket.socket, "recv", noted)
+                await client.publish("roisearch/reports", b"x" * 9_000_000, qos=1)
+                await client.publish("roisearch/reports", lines(*frames(1, "after")), qos=1)
+                while (await receipts_of(client, 1))[0]["id"] != "after0":
+                    pass
+
+    asyncio.run(talk())
+    assert longest < 1_000_000  # the client library asks for all that a message has left
+    assert taker.ids == ["f0", "after0"]
+
+
 @needs_mosquitto
 def test_a_broker_that_comes_late_or_goes_away_is_called_again_with_name_and_password(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -308,9 +308,37 @@ def test_a_batch_of_any_length_is_refused_before_all_of_it_is_checked() -> None:
     wrong: list[Any] = [{}] * 5
     http = settings(max_body_bytes=1 << 24)
     answer = ask("POST", "/api/reports", json=[*many, *wrong], http=http, run=run)
-    assert answer.status_code == 422
-    assert f"at most {MOST_BATCH} items" in answer.text
+    assert answer.status_code == 413
+    assert "a batch has at most 500 reports" in answer.text
     assert run.reports == []
+
+
+def test_others_have_their_turn_while_a_batch_is_checked() -> None:
+    """Twenty frames with all the detections that a report may hold take a tenth of a second."""
+
+    async def talk() -> int:
+        turns = 0
+
+        async def others() -> None:
+            nonlocal turns
+            while True:
+                turns += 1
+                await asyncio.sleep(0)
+
+        async with in_memory(FakeRun(), http=settings(detections_per_s=1e6)) as client:
+            beside = asyncio.create_task(others())
+            answer = await client.post("/api/reports", json=[{**FRAME, "id": f"{n}"} for n in range(400)])
+            beside.cancel()
+        assert answer.status_code == 200
+        return turns
+
+    assert asyncio.run(talk()) >= 400
+
+
+def test_what_is_wrong_in_a_batch_is_told_by_its_number() -> None:
+    answer = ask("POST", "/api/reports", json=[FRAME, {**FRAME, "detections": [{"lat": 91}]}])
+    assert answer.status_code == 422
+    assert [each["loc"] for each in answer.json()["detail"]] == [["body", 1, "detections", 0, "lat"]]
 
 
 def test_a_batch_larger_than_the_bucket_passes_once_and_is_paid_back() -> None:

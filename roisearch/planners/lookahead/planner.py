@@ -22,6 +22,7 @@ from roisearch.planners.lookahead import plans
 from roisearch.planners.lookahead.desk import make_chart, make_rules, make_tree, region_map
 from roisearch.planners.lookahead.others import OthersLooks, fill
 from roisearch.planners.lookahead.settings import LookaheadSettings
+from roisearch.planners.lookahead.small import MOST_CELLS, tour_from
 from roisearch.planners.lookahead.sweeps import ANYWHERE
 from roisearch.planners.lookahead.thinking import Kept, Thinking
 from roisearch.planners.warm import warm_up
@@ -311,6 +312,20 @@ class LookaheadPlanner:
         horizon = self._affordable(ways * self.settings.horizon) // ways
         with self._making(0, ways):
             plans.replan(pose, self._tree, self.thinking.desk, horizon, pause)
+        if self._chart.mass.size <= MOST_CELLS and self._fov.is_point and self._others is None:
+            self._try_a_tour(pose)
+
+    def _try_a_tour(self, pose: Pose) -> None:
+        """Let a tour be the plan, if it is better than what was planned; see `small`."""
+        shape, random = (self._chart.rows, self._chart.cols), int(self._random[0])
+        mass = self._chart.mass.reshape(shape)
+        cells = tour_from(pose, mass, self._fov, self._flyable, random, self._make_until)
+        planned, expected = self.thinking.kept(), self.expected()
+        cells = cells[: self.settings.horizon]
+        if cells.size:
+            self.thinking.take_up(Kept(cells, np.full(cells.size, ANYWHERE)), pose)
+            if self.expected() >= expected:
+                self.thinking.take_up(planned, pose)
 
     def _affordable(self, most: int) -> int:
         """How many of `most` steps there is time to plan in this decision; never so few that it would be blind."""

@@ -6,7 +6,7 @@ ArduPilot).
 """
 
 from service.mavlink.checking import check_link
-from service.mavlink.errors import CommandFailed, LinkError, NotPermitted, NoVehicle
+from service.mavlink.errors import CommandFailed, LinkError, NotAnswered, NotPermitted, NoVehicle
 from service.mavlink.events import Home
 from service.mavlink.history import PastPose, PoseHistory
 from service.mavlink.modes import ModeKind
@@ -22,6 +22,7 @@ __all__ = [
     "MavlinkSettings",
     "ModeKind",
     "NoVehicle",
+    "NotAnswered",
     "NotPermitted",
     "PastPose",
     "PoseHistory",

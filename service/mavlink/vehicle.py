@@ -22,13 +22,14 @@ from service.clock import Clock
 from service.mavlink.autopilots.base import Autopilot
 from service.mavlink.command import Command
 from service.mavlink.core import LinkCore
-from service.mavlink.errors import CommandFailed, NotPermitted, NoVehicle
+from service.mavlink.errors import CommandFailed, NotAnswered, NotPermitted, NoVehicle
 from service.mavlink.events import (
     Accepted,
     Cancelled,
     Notice,
     Outcome,
     Refused,
+    Silent,
     Target,
     VehicleEvent,
 )
@@ -425,7 +426,8 @@ class Vehicle:
         wait = 0.0 if isinstance(outcome, Cancelled) else self._shell.patience(_MODE_S)
         if not await self.wait_until(lambda t: t.mode == mode, wait):
             why, (was, wanted) = await self._explain(outcome, since), map(mode_title, (before, mode))
-            raise CommandFailed(f"the vehicle did not go from {was} to {wanted}: {why}")
+            failed = NotAnswered if isinstance(outcome, Silent) else CommandFailed
+            raise failed(f"the vehicle did not go from {was} to {wanted}: {why}")
 
     async def _explain(self, outcome: Outcome, since: float) -> str:
         """What became of a command that did not do what it should, for a person."""

@@ -30,15 +30,16 @@ class ByItself:
 
     def on(self, news: News, look: Look) -> Iterator[Wish]:
         """It is flown, or it was in vain: where the autopilot does not know the way home, or will not fly it, it
-        lands."""
+        lands. One that says nothing may only not have heard of it: a landing would be on whatever lies below."""
         if not isinstance(news, (Done, Failed)) or not isinstance(news.action, (ReturnToLaunch, Land)):
             return
         t, lands = look.seen.telemetry, self._lands
         self._flies = isinstance(news, Done)
         if isinstance(news, Failed):
             self._ordered = look.now
-            self._refused += look.heard() and t.in_control
-            self._lands = bool(look.helm.doubts(t, look.now)) or self._refused >= LANDS_AFTER
+            if news.answered:
+                self._refused += look.heard() and t.in_control
+                self._lands = bool(look.helm.doubts(t, look.now)) or self._refused >= LANDS_AFTER
             if self._lands and not lands:
                 yield from warn(f"it lands where it is: {news.reason}", look)
 

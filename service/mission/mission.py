@@ -410,7 +410,7 @@ class Mission:
                 else await do(action, self.vehicle, patience)
             )
         except LinkError as error:
-            news = Failed(action, str(error))
+            news = Failed(action, str(error), error.answered)
         self._acting = None
         self._feed(news)
 

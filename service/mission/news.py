@@ -80,10 +80,11 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """An action could not be carried out, or the vehicle did not do it."""
+    """An action could not be carried out, or the vehicle did not do it, `answered` or without a word."""
 
     action: Action
     reason: str
+    answered: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,7 @@ _ALLOWED: dict[str, set[str]] = {
     "MAV_CMD_DO_REPOSITION": _FLY | _HOVER,
     "MAV_CMD_DO_CHANGE_SPEED": _FLY | _HOVER,  # moves nothing: sent again once the mode was entered anew
     "MAV_CMD_NAV_RETURN_TO_LAUNCH": {"RETURNING"},
+    "MAV_CMD_NAV_LAND": {"RETURNING"},
     "MAV_CMD_COMPONENT_ARM_DISARM": {"TAKEOFF"},
     "MAV_CMD_NAV_TAKEOFF": {"TAKEOFF"},
     "MAV_CMD_DO_SET_MODE": {"READY", "TAKEOFF", "RETURNING"},  # elsewhere an operator must have ordered it
@@ -88,6 +89,7 @@ class Judge:
         self._stopped_at, self._stopped_by = math.inf, ""
         self._level: tuple[float, float] | None = None  # percent, when
         self._state_since = -math.inf
+        self._return_answered_at = -math.inf
         self._too_close = False
         self._braked = False  # and not flown on since
         self._crashed = False
@@ -173,6 +175,8 @@ class Judge:
                 if message.battery_remaining >= 0:
                     self._level = (float(message.battery_remaining), now)
             elif message.get_type() == "COMMAND_ACK":
+                if message.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+                    self._return_answered_at = now
                 if message.command == mavlink.MAV_CMD_DO_REPOSITION and message.result != _ACCEPTED:
                     self._stop = None  # it has not stopped there: the next stop is where it can by then
             elif message.get_type() == "HEARTBEAT":
@@ -222,6 +226,8 @@ class Judge:
             found.append("not in this state")
         if name == "MAV_CMD_DO_REPOSITION":
             found += self._reposition(message, now)
+        if name == "MAV_CMD_NAV_LAND" and self._return_answered_at < self._state_since:
+            found.append("it lands where it is, and the return home was never answered")
         return [*found, *self._against_a_person(name, now), *self._on_an_unknown_battery(name, now)]
 
     def _is_brake(self, name: str, message: Any) -> bool:

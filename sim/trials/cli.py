@@ -33,6 +33,8 @@ from sim.trials.flight_cli import fly, is_flight
 from sim.trials.forecast import Forecast
 from sim.trials.journal import Journal, Refused, with_earlier_planners
 from sim.trials.pool import executor, exit_code, run
+from sim.trials.proven_cli import is_proven
+from sim.trials.proven_cli import main as prove
 from sim.trials.published import shown
 from sim.trials.report import percent, write_report
 from sim.trials.trial import run_job
@@ -51,7 +53,8 @@ def parser() -> argparse.ArgumentParser:
         "far above the bound they are. Run again with the same --out, it continues where it ended, and takes planners "
         "that are new to it.",
         epilog="Other campaigns, each with a --help of its own: --preset flight (seconds of flight), --preset battery "
-        "(the end of a battery planned or cut off), --preset walking (a target that walks; with --optimum "
+        "(the end of a battery planned or cut off), --preset proven (the default in steps beside the bound that counts "
+        "travel), --preset walking (a target that walks; with --optimum "
         "beside the best flight), "
         "--searchers N,.. (several searchers on one belief).",
     )
@@ -159,6 +162,8 @@ def main(arguments: list[str]) -> int:
         return fly(arguments)
     if is_battery(arguments):
         return battery(arguments)
+    if is_proven(arguments):
+        return prove(arguments)
     if is_walking(arguments):
         return walking(arguments)
     if is_fleet(arguments):

@@ -310,6 +310,17 @@ def test_a_landing_of_the_autopilots_own_by_a_position_that_jumps_is_nobody_else
     assert len(wire.judge.violations) == seen
 
 
+def test_a_landing_where_it_is_is_for_an_autopilot_that_has_answered_the_return() -> None:
+    wire = Wire()
+    wire.state("RETURNING")
+    assert "never answered" in wire.says(mavlink.MAV_CMD_NAV_LAND)[0]
+    answer = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, 2)
+    wire.judge.from_autopilot(_from_autopilot(answer), wire.now)
+    assert wire.says(mavlink.MAV_CMD_NAV_LAND) == []
+    wire.state("SEARCHING")
+    assert wire.says(mavlink.MAV_CMD_NAV_LAND)
+
+
 def test_violations_are_counted_by_the_fault_that_came_last() -> None:
     wire = Wire()
     wire.judge.during = "home_moved"

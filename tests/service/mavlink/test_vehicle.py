@@ -18,7 +18,15 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.clock import Clock
 from service.errors import BadInput
-from service.mavlink import CommandFailed, LinkError, MavlinkSettings, NotPermitted, NoVehicle, Vehicle
+from service.mavlink import (
+    CommandFailed,
+    LinkError,
+    MavlinkSettings,
+    NotAnswered,
+    NotPermitted,
+    NoVehicle,
+    Vehicle,
+)
 from service.mavlink.events import (
     LinkBack,
     LinkLost,
@@ -401,5 +409,43 @@ def test_the_last_heartbeat_counts_even_if_the_event_loop_has_not_got_round_to_i
                 drone.send(peer.heartbeat())
                 with pytest.raises(NotPermitted, match="not by us"):  # at once, nothing awaited in between
                     vehicle.reposition(north(20.0), HOME[1], HOME[2] + 20.0)
+
+    asyncio.run(main())
+
+
+def test_a_command_that_was_refused_and_one_that_nobody_answered_fail_differently() -> None:
+    """A refusal may lead to a landing where it is; silence tells nothing of whether it was heard."""
+
+    async def beat(drone: socket.socket, peer: Peer) -> None:
+        while True:
+            drone.send(peer.heartbeat())
+            await asyncio.sleep(0.2)
+
+    async def main() -> None:
+        async with opened("udpin://127.0.0.1:0", speedup=4.0) as vehicle:
+            peer = Peer()
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
+                drone.connect(("127.0.0.1", int(vehicle.address.rsplit(":", 1)[1])))
+                for frame in (peer.heartbeat(), peer.position(START), peer.landed_state()):
+                    drone.send(frame)
+                await vehicle.connect(5.0)
+                assert await vehicle.wait_until(lambda t: t.landed_state == "in_air", 5.0)
+                await vehicle.enter_guided()
+                beating = asyncio.create_task(beat(drone, peer))
+                with pytest.raises(NotAnswered, match="it did not answer") as silence:
+                    await vehicle.return_to_launch()
+                ordered = asyncio.create_task(vehicle.return_to_launch())
+                while not ordered.done():
+                    drone.send(
+                        peer.pack(
+                            mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, 2)
+                        )
+                    )
+                    await asyncio.sleep(0.1)
+                with pytest.raises(CommandFailed, match="it answered DENIED") as refusal:
+                    await ordered
+                beating.cancel()
+                assert (silence.value.answered, refusal.value.answered) == (False, True)
+                assert not NotPermitted("nothing was sent").answered
 
     asyncio.run(main())

@@ -154,9 +154,9 @@ class Talk:
         """The action under way is done."""
         return self.on(Done(self.doing()))
 
-    def failed(self, reason: str) -> list[Effect]:
+    def failed(self, reason: str, *, answered: bool = True) -> list[Effect]:
         """The action under way was in vain."""
-        return self.on(Failed(self.doing(), reason))
+        return self.on(Failed(self.doing(), reason, answered))
 
     def happens(self, event: Event) -> list[Effect]:
         """What follows when a phase wishes an event."""

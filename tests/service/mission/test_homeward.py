@@ -137,8 +137,22 @@ def test_a_return_that_is_refused_is_ordered_again_in_any_mode_and_lands_in_the_
         assert talk.core.doing is None
         talk.pass_by(2.0)
     assert talk.doing() == Land()
-    talk.failed("it did not answer")
+    talk.failed("it did not answer", answered=False)
     talk.pass_by(HOME_AGAIN_S + 1.0)
+    assert talk.doing() == Land()
+
+
+def test_a_return_that_is_not_answered_while_the_position_is_in_doubt_does_not_become_a_landing() -> None:
+    """An autopilot that was not heard for half a minute has not heard of the return: when it is there again, it is
+    ordered home, and not down onto whatever lies below."""
+    talk = homebound()
+    talk.shows(fix=1)
+    for _ in range(2 * LANDS_AFTER):
+        assert talk.doing() == ReturnToLaunch()
+        talk.failed("it did not answer", answered=False)
+        talk.pass_by(HOME_AGAIN_S + 2.0)
+    talk.failed("it answered DENIED")
+    talk.pass_by(HOME_AGAIN_S + 2.0)
     assert talk.doing() == Land()
 
 
@@ -148,7 +162,7 @@ def test_a_return_that_fails_as_nobody_hears_it_does_not_become_a_landing() -> N
     for _ in range(2 * LANDS_AFTER):
         talk.pass_by(HOME_AGAIN_S + 2.0)
         assert talk.doing() == ReturnToLaunch()
-        talk.failed("the vehicle has not been heard")
+        talk.failed("the vehicle has not been heard", answered=False)
 
 
 def test_a_return_that_an_order_broke_off_in_vain_is_ordered_again() -> None:

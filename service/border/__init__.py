@@ -2,7 +2,7 @@
 
 Whatever strangers send and ask for, they must not be able to keep the aircraft waiting: its heartbeat once a second,
 the pilot's mode change, the operator's Hold. So what they touch lives in a process of its own, the door process: HTTP,
-WebSocket, page, MQTT, UDP and the Unix socket, with their parsing, checks, rate limits, JSON and pictures. The link,
+WebSocket, page, MQTT, UDP and the Unix socket, with their parsing, checks, rate limits and JSON. The link,
 the mission, the belief, the intake and the journal stay in the flying process.
 
 Why a process and not a thread? A thread shares the interpreter's lock with the flight, and `json.loads`, a validation
@@ -24,6 +24,10 @@ Nothing is sent without having been asked for, so nothing can pile up on either 
 memory that both share (`memory`). Everything a door sends is checked again on the flight's side (`counter`), and only
 JSON is ever read there: who takes the door process over can send reports and orders, which he could before, and no
 more.
+
+What takes long to draw, the texts and pictures of maps, a third process draws for the door process (`drawing`), so that
+an order never waits for a map either. Whatever strangers send has few turns before an order has its next one:
+newcomers, datagrams, lines, what watchers say, the reports of a batch.
 
 The addresses are taken by the flying process before anything starts, and inherited (`hello`). A door process that ends,
 or hangs, is said and started again, and the flight goes on meanwhile (`keeper`). One that has lost its flight ends.

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.border.asking import DEED_S, LOOK_S, Asking
-from service.border.drawing import Drawing, Sight
+from service.border.drawer import Sight
+from service.border.drawing import Drawing
 from service.border.limits import MOST_FRAMES, MOST_IN_A_FRAME, MOST_NEWS, MOST_ORDERS, MOST_TEXT
 from service.border.memory import SharedMap
 from service.border.rounds import Rounds

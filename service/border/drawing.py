@@ -1,4 +1,4 @@
-"""Maps are drawn in a process of their own, beside the door process: `python -m service.border.drawing CHANNEL`.
+"""Maps are drawn in a process of their own (`drawer`), beside the door process.
 
 A thread would do, but for the interpreter's lock: with it, every byte that the doors read or write waits until the
 thread that draws has had its turn, and on a busy core an order took most of a second on its way through them.
@@ -7,40 +7,15 @@ thread that draws has had its turn, and on a busy core an order took most of a s
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import ctypes
-import os
-import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
+from service.border import drawer
+from service.border.drawer import Sight
 from service.http.run import Unanswered
-from service.view.feed import Moment
-from service.view.maps import draw_map, geojson_text, map_text
 from service.view.scene import SearchGround
-
-_PR_SET_PDEATHSIG = 1
-_NICENESS = 10
-
-
-@dataclass(frozen=True)
-class Sight:
-    """What is to be drawn; the digest is the belief's, where one was asked for."""
-
-    moment: Moment
-    digest: str
-
-
-_Draw = Callable[[SearchGround, Sight], bytes]
-KINDS: dict[str, _Draw] = {
-    "map": lambda ground, sight: map_text(ground, sight.moment, sight.digest),
-    "geojson": lambda ground, sight: geojson_text(ground, sight.moment),
-    "picture": lambda ground, sight: draw_map(ground, sight.moment),
-}
 
 
 class Drawing:
@@ -53,17 +28,15 @@ class Drawing:
         self._told: SearchGround | None = None
 
     async def draw(self, kind: str, ground: SearchGround, sight: Sight) -> bytes:
-        """A map of one of `KINDS`, one after the other. Raises Unanswered when the process ends over it."""
+        """A map of one of `drawer.KINDS`, one after the other. Raises Unanswered when the process ends over it."""
         async with self._turn:
             if self._channel is None:
                 self._start()
             news = None if ground is self._told else ground
             self._told = ground
-            # who gives up waiting leaves the answer in the channel, where the next would take it for his own
-            asking = asyncio.ensure_future(asyncio.to_thread(self._ask, kind, news, sight))
             try:
-                return await asyncio.shield(asking)
-            except asyncio.CancelledError:
+                return await asyncio.to_thread(self._ask, kind, news, sight)
+            except asyncio.CancelledError:  # the answer would be in the channel, and taken for the next one's
                 self.end()
                 raise
             except (EOFError, OSError):
@@ -73,7 +46,7 @@ class Drawing:
     def _start(self) -> None:
         ours, theirs = socket.socketpair()
         with theirs:
-            words = [sys.executable, "-m", __name__, str(theirs.fileno())]
+            words = [sys.executable, "-m", drawer.__name__, str(theirs.fileno())]
             self._process = subprocess.Popen(words, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
         self._channel = Connection(ours.detach())
 
@@ -90,28 +63,3 @@ class Drawing:
             self._process.wait()
             self._channel.close()
         self._process = self._channel = self._told = None
-
-
-def _draw_for_ever(channel: Connection) -> None:
-    """Draw what is asked for, until whoever asks is gone. What comes is of the process that started this one."""
-    ground: SearchGround | None = None
-    while True:
-        kind, news, sight = channel.recv()
-        ground = news or ground
-        assert ground is not None
-        channel.send_bytes(KINDS[kind](ground, sight))
-
-
-def main() -> None:
-    """Draw for the other end of the channel that the first argument names."""
-    parent = os.getppid()
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    with contextlib.suppress(OSError):
-        os.nice(_NICENESS)
-    if os.getppid() == parent:
-        with contextlib.suppress(EOFError, ConnectionError):
-            _draw_for_ever(Connection(int(sys.argv[1])))
-
-
-if __name__ == "__main__":
-    main()

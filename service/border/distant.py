@@ -26,7 +26,6 @@ from service.evidence.images import Images, brings
 from service.evidence.reports import OrderReceipt, Receipt, Report
 from service.geometry import LatLon
 from service.news.request import NewsRequest
-from service.rows import DecisionRow
 from service.telling.searched import POD_AT_LEAST, Outline, outlines
 from service.view.feed import Moment
 from service.view.scene import SearchGround
@@ -131,10 +130,9 @@ class DistantRun:
         """What Prometheus is told."""
         return str((await self._metrics.next())["text"]).encode()
 
-    async def decisions(self, count: int) -> list[dict[str, Any]]:
-        """The last decisions with their reasons and options, the newest first, from the journal."""
-        made = await asyncio.to_thread(read_last_entries, self._journal, DecisionRow, count)
-        return [{"time": entry.time, **entry.said.body()} for entry in made]
+    async def decisions(self, count: int) -> bytes:
+        """The last decisions with their reasons and options, the newest first, from the journal, as JSON."""
+        return await self._drawing.decisions(self._journal, count)
 
     async def map(self) -> bytes:
         """Belief and POD, cell by cell, as JSON."""

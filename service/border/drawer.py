@@ -1,4 +1,5 @@
-"""The process that draws maps: `python -m service.border.drawer CHANNEL`, a file descriptor that it inherits.
+"""The process that draws maps, and writes out what is long: `python -m service.border.drawer CHANNEL`, the number of a
+file descriptor that it inherits.
 
 It imports no more than it needs: who asks for the first map waits for that.
 """
@@ -7,13 +8,17 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import json
 import os
 import signal
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from pathlib import Path
 
+from service.entries import read_last_entries
+from service.rows import DecisionRow
 from service.view.feed import Moment
 from service.view.maps import draw_map, geojson_text, map_text
 from service.view.scene import SearchGround
@@ -30,8 +35,14 @@ class Sight:
     digest: str
 
 
-_Draw = Callable[[SearchGround, Sight], bytes]
-KINDS: dict[str, _Draw] = {
+def decisions_text(journal: Path, count: int) -> bytes:
+    """The last decisions of a journal with their reasons and options, the newest first, as JSON."""
+    made = read_last_entries(journal, DecisionRow, count)
+    return json.dumps([{"time": entry.time, **entry.said.body()} for entry in made]).encode()
+
+
+TEXTS: dict[str, Callable[..., bytes]] = {"decisions": decisions_text}
+MAPS: dict[str, Callable[[SearchGround, Sight], bytes]] = {
     "map": lambda ground, sight: map_text(ground, sight.moment, sight.digest),
     "geojson": lambda ground, sight: geojson_text(ground, sight.moment),
     "picture": lambda ground, sight: draw_map(ground, sight.moment),
@@ -39,13 +50,17 @@ KINDS: dict[str, _Draw] = {
 
 
 def _draw_for_ever(channel: Connection) -> None:
-    """Draw what is asked for, until whoever asks is gone. What comes is of the process that started this one."""
+    """Draw what is asked for, until whoever asks is gone. What comes is of the process that started this one: the kind,
+    the ground where it is another one, and what else that kind needs."""
     ground: SearchGround | None = None
     while True:
-        kind, news, sight = channel.recv()
+        kind, news, more = channel.recv()
         ground = news or ground
-        assert ground is not None
-        channel.send_bytes(KINDS[kind](ground, sight))
+        if kind in TEXTS:
+            channel.send_bytes(TEXTS[kind](*more))
+        else:
+            assert ground is not None
+            channel.send_bytes(MAPS[kind](ground, *more))
 
 
 def main() -> None:

@@ -217,8 +217,8 @@ def create_app(
     )
     async def decisions(
         at: At = None, count: Annotated[int, Query(ge=1, le=_MOST_DECISIONS)] = 20
-    ) -> list[dict[str, Any]]:
-        return await then(at).decisions(count)
+    ) -> Response:
+        return Response(await then(at).decisions(count), media_type="application/json")
 
     @app.get(
         "/api/written",

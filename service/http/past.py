@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -57,9 +58,9 @@ class _Then:
         draw = await self._look(ReplayView.picture)  # of a copy: others look meanwhile
         return await asyncio.to_thread(draw)
 
-    async def decisions(self, count: int) -> list[dict[str, Any]]:
-        """The last decisions until then, the newest first."""
-        return await self._look(lambda view: view.decisions(count))
+    async def decisions(self, count: int) -> bytes:
+        """The last decisions until then, the newest first, as JSON."""
+        return await self._look(lambda view: json.dumps(view.decisions(count)).encode())
 
     async def moment(self) -> Moment:
         """What there was to see."""

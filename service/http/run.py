@@ -38,8 +38,8 @@ class ShownMoment(Protocol):
         """The map as a PNG."""
         ...
 
-    async def decisions(self, count: int) -> list[dict[str, Any]]:
-        """The last decisions, the newest first."""
+    async def decisions(self, count: int) -> bytes:
+        """The last decisions, the newest first, as JSON."""
         ...
 
     async def moment(self) -> Moment:

@@ -60,6 +60,16 @@ def maps(address: str) -> None:
                     time.sleep(0.05)
 
 
+def decisions(address: str) -> None:
+    """As many decisions as there may be in an answer, again and again."""
+    with httpx.Client(base_url=address, timeout=60.0) as client:
+        while True:
+            try:
+                client.get("/api/decisions?count=1000")
+            except httpx.HTTPError:
+                time.sleep(0.05)
+
+
 def half_open(address: str) -> None:
     """Hundreds of connections with half a request each, renewed when they are ended."""
     where = urlsplit(address)
@@ -133,6 +143,7 @@ def published(address: str) -> None:
 KINDS: dict[str, Callable[[str], None]] = {
     "costly reports": costly_reports,
     "maps": maps,
+    "decisions": decisions,
     "half-open connections": half_open,
     "wishes": wishes,
     "datagrams": datagrams,

@@ -314,6 +314,7 @@ def test_maps_are_drawn_in_another_process_that_may_end(tmp_path: Path) -> None:
             cells, geojson = await asyncio.gather(*both)
             assert len(cells.json()["probability"]) == Flown().ground.grid.frame.shape[0]
             assert geojson.json()["type"] == "FeatureCollection"
+            assert (await client.get("/api/decisions")).json() == []
             (drawing,) = started_by(door)
             os.kill(drawing, signal.SIGKILL)
             said = (await client.get("/api/map")).status_code

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
@@ -46,8 +47,8 @@ class FakeRun:
     async def metrics(self) -> bytes:
         return b""
 
-    async def decisions(self, count: int) -> list[dict[str, Any]]:
-        return [{"reason": "because"}][:count]
+    async def decisions(self, count: int) -> bytes:
+        return json.dumps([{"reason": "because"}][:count]).encode()
 
     def scene(self) -> dict[str, Any]:
         return {"area": "field", "drawn": 0}

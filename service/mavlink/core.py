@@ -117,14 +117,15 @@ class LinkCore(LinkMemory):
     # ---- what moves the aircraft
 
     def take_control(self, now: float) -> None:
-        """On an operator's order: the aircraft, in its guided mode already, is ours to move from now on.
+        """On an operator's order: the aircraft, in its guided mode already, is ours to move from now on. One that
+        stands in the mode that only stops is ours to be sent home.
 
         Raises:
             NotPermitted: it is not, or it is not heard.
         """
         self._wake(now)
         reason = self.why_not_command(now, ordered=True)
-        if reason is None and self.autopilot is not None:
+        if reason is None and self.autopilot is not None and not self.telemetry.stopped:
             reason = gates.why_not_guided(self.autopilot, self.telemetry)
         if reason is not None:
             raise NotPermitted(f"cannot take control: {reason}")

@@ -64,6 +64,8 @@ class Telemetry:
     mode: str = ""
     guided: bool = False
     """The heartbeat shows the mode that flies repositions."""
+    stopped: bool = False
+    """It shows the mode that does nothing but stop, which is another one (ArduCopter's BRAKE)."""
     armed: bool = False
     system_status: int = 0
     landed_state: str = "undefined"
@@ -184,6 +186,7 @@ def heartbeat(t: Telemetry, m: Message, autopilot: Autopilot, now: float) -> Tel
         heartbeat_time=now,
         mode=mode,
         guided=mode == autopilot.guided_mode,
+        stopped=mode == autopilot.stop_mode,
         armed=bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED),
         system_status=m.system_status,
         link_lost=False,
@@ -198,6 +201,7 @@ def after_reboot(t: Telemetry) -> Telemetry:
         autopilot=t.autopilot,
         mode=t.mode,
         guided=t.guided,
+        stopped=t.stopped,
         armed=t.armed,
         system_status=t.system_status,
         link_lost=t.link_lost,

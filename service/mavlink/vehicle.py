@@ -226,7 +226,8 @@ class Vehicle:
         """On an operator's order: enter the guided mode if need be, and take control.
 
         Args:
-            there: nobody has ordered it: its pilot gives the aircraft over by having selected the mode.
+            there: nobody has ordered it: its pilot gives the aircraft over by having selected the mode, or an earlier
+                process has left it in that, or in the one that only stops, where it stays.
             out_of: nobody has ordered it just now: only out of this mode, which its pilot may have left since.
 
         Raises:
@@ -234,9 +235,10 @@ class Vehicle:
             CommandFailed: it does not enter the mode.
         """
         self._shell.pump()
-        if not self.telemetry.guided and (there or out_of not in (None, self.telemetry.mode)):
+        stays = there and self.telemetry.stopped
+        if not (self.telemetry.guided or stays) and (there or out_of not in (None, self.telemetry.mode)):
             raise NotPermitted(f"its pilot has selected {mode_title(self.telemetry.mode)}")
-        if not self.telemetry.guided or self._core.goes_by_itself(self._clock.now()):
+        if not (self.telemetry.guided or stays) or self._core.goes_by_itself(self._clock.now()):
             autopilot = self._need_autopilot()
             await self._reach(autopilot.set_mode(autopilot.guided_mode), autopilot.guided_mode, ordered=True)
         self._core.take_control(self._clock.now())

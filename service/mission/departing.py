@@ -124,8 +124,8 @@ class Handover:
         elif why:
             if not before:
                 yield from warn(f"it is not taken over: {why}", look)
-        elif not (doubts := look.helm.doubts(t, look.now)):
-            yield EnterGuided(there=True)
+        elif not (doubts := look.helm.doubts(t, look.now)) or (look.flight.flown and look.energy_low()):
+            yield EnterGuided(there=True)  # what was left in the air must not hover there until it falls
         elif not self._told:  # what is not heard yet is no fault, and no reason to begin
             self._told = True
             yield Note(f"the search waits for the position: {'; '.join(doubts)}")

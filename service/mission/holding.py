@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from service.mission.effects import EnterGuided, Stop
 from service.mission.limits import hold_objection, not_airborne
 from service.mission.phase import RETRY_S, Happen, Phase, Release, Wish
-from service.mission.situation import hovering, on_ground
+from service.mission.situation import on_ground, standing_still
 from service.mission.standing import Look
 from service.mission.states import Event
 
@@ -24,13 +24,14 @@ STAYS = {"operator", "link", "position"}  # causes that no patience ends
 class Holding(Phase):
     """HOLDING; several causes can hold at once, and the search goes on when none does.
 
-    `as_left`: the run was holding when an earlier process left it. What hovers in the guided mode then is still ours,
-    and is taken in hand without being moved, so that it can be sent home when its energy ends.
+    `as_left`: the run was holding when an earlier process left it. What hovers in the guided mode then, or where it was
+    stopped without a position, is still ours, and is taken in hand without being moved, so that it can be sent home
+    when its energy ends.
     """
 
     def __init__(self, *, as_left: bool = False) -> None:
         self._again_at = math.inf
-        self._take = as_left
+        self._take, self._take_at = as_left, -math.inf
         self._prompt_since = self._clear_since = self._alone_since = math.inf
         self._climb_at = -math.inf
         self._guided_at = 0.0
@@ -43,8 +44,9 @@ class Holding(Phase):
         """Is a cause gone, or is it time to fly home?"""
         standing, now, t = look.standing, look.now, look.seen.telemetry
         causes, low = standing.causes, look.energy_low()
-        if self._take and hovering(t) and not look.busy:
-            self._take = False
+        self._take &= not t.in_control
+        if self._take and standing_still(t) and not look.busy and now >= self._take_at:
+            self._take_at = now + RETRY_S
             yield EnterGuided(there=True)
         if now >= self._again_at and look.heard():  # to whom is not heard nothing is sent
             self._again_at = math.inf

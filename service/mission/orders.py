@@ -35,7 +35,9 @@ STOPPING = ("hold", "return", "home", "finish", "abort", "leave")
 OFFERED = ("hold", "resume", "return", "launch", "replace", "finish")
 """Orders that a page has a button for."""
 _MAY_LAUNCH = (State.READY, State.GROUNDED, State.YIELDED, State.HOLDING)
-_TAKES = ("resume", "return", "launch")  # what takes a yielded aircraft; finish and abort send it nothing
+_TAKEN_UP = {State.YIELDED: ("resume", "return", "launch"), State.HOLDING: ("resume", "launch")}
+"""What takes an aircraft that a pilot may have, in these states; a launch does in every one. Finish and abort send a
+yielded one nothing."""
 _BEFOREHAND = ("hold", "return", "finish")  # mean something to an aircraft that is not heard yet
 STICKS = 0.15  # part of their way, from which on deflected sticks are a hand on them
 
@@ -78,7 +80,7 @@ def ordered(order: Order, look: Look) -> Iterator[Wish]:
             first = state in (State.YIELDED, State.HOLDING) and not ours
         case "return":
             wish = Happen(Event.RETURN, ASKED, stopped="the operator asked to return")
-            first = state == State.YIELDED and not down
+            first = state in (State.YIELDED, State.HOLDING) and not t.in_control and not down
         case "launch":
             yield Answer(order.ticket)  # getting ready may take long
             yield Pending(order.command, WaitReady(), (climb(look),), 0)
@@ -163,8 +165,8 @@ def _refusal(command: str, look: Look) -> str:
     t = look.seen.telemetry
     if why := _senseless(command, look):
         return why
-    yielded = look.standing.state == State.YIELDED
-    takes = command in _TAKES if yielded else command == "resume" and look.standing.state == State.HOLDING
+    takes = command in _TAKEN_UP.get(look.standing.state, ("launch",))
+    takes |= command == "return" and look.standing.state == State.HOLDING and not t.in_control
     if takes and (t.sticks or 0.0) > STICKS:
         return "the pilot's sticks are not in the middle; the pilot has the aircraft"
     if command == "launch":

@@ -55,3 +55,8 @@ def on_ground(t: Telemetry) -> bool:
 def hovering(t: Telemetry) -> bool:
     """In the air, armed, in the guided mode."""
     return t.landed_state == "in_air" and t.guided and t.armed
+
+
+def standing_still(t: Telemetry) -> bool:
+    """The same, or in the mode that only stops."""
+    return hovering(t) or (t.landed_state == "in_air" and t.stopped and t.armed)

@@ -69,6 +69,7 @@ class ArduCopter(Autopilot):
     takeoff_mode = "GUIDED"
     return_mode = "RTL"
     land_mode = "LAND"
+    stop_mode = "BRAKE"
     kinds: ClassVar[dict[str, ModeKind]] = {
         "GUIDED": ModeKind.GUIDED,
         "RTL": ModeKind.RETURN,
@@ -103,7 +104,7 @@ class ArduCopter(Autopilot):
 
     def brake(self) -> Command:
         """The mode BRAKE. It is left by entering GUIDED again."""
-        return self.set_mode("BRAKE")
+        return self.set_mode(self.stop_mode)
 
     def break_off_climb(self) -> Command:
         """Its take-off is flown in the guided mode, so it has to leave that."""

@@ -34,6 +34,8 @@ class Autopilot(ABC):
     """The mode the heartbeat shows during the climb."""
     return_mode: ClassVar[str]
     land_mode: ClassVar[str]
+    stop_mode: ClassVar[str] = ""
+    """A mode that only stops, where `brake` enters one beside the guided mode."""
     kinds: ClassVar[Mapping[str, ModeKind]]
     """Of every mode name that is not OTHER."""
     deceleration_mps2: ClassVar[float]

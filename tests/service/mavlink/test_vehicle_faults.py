@@ -10,6 +10,7 @@ from service.mavlink import NotPermitted, Vehicle
 from service.mavlink.events import AnotherService, Notice, TargetReplaced, VehicleEvent
 from tests.fixtures_autopilot import StartAutopilot, flavor, start_autopilot
 
+from .peer import GUIDED, RETURN
 from .test_vehicle import HOME, SPEEDUP, Mock, flight, north, up
 
 __all__ = ["flavor", "start_autopilot"]
@@ -90,6 +91,29 @@ def test_a_brake_stops_it_without_a_position(
 
     flight(mock, fly)
     assert speeds
+
+
+def test_what_an_earlier_process_stopped_is_taken_in_hand_where_it_stands_and_sent_home(
+    flavor: str, start_autopilot: StartAutopilot, tmp_path: Path
+) -> None:
+    """ArduCopter stands in BRAKE, which no pilot has chosen; nothing leads it out of that before it is sent home."""
+    mock = world(start_autopilot, flavor, tmp_path, "")
+    modes: list[str] = []
+
+    async def fly(vehicle: Vehicle, events: list[VehicleEvent]) -> None:
+        await up(vehicle)
+        vehicle.brake()
+        braked = "BRAKE" if flavor == "ardupilot" else GUIDED[flavor]
+        assert await vehicle.wait_until(lambda t: t.mode == braked and t.ground_speed_mps < 0.3, 20.0)
+        vehicle.release_control("another process")
+        await vehicle.enter_guided(there=True)
+        modes.append(vehicle.telemetry.mode)
+        assert vehicle.telemetry.in_control
+        await vehicle.return_to_launch()
+        modes.append(vehicle.telemetry.mode)
+
+    flight(mock, fly)
+    assert modes == ["BRAKE" if flavor == "ardupilot" else GUIDED[flavor], RETURN[flavor]]
 
 
 def test_arming_is_tried_again_while_the_autopilot_says_why_not(

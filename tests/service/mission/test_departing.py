@@ -28,6 +28,7 @@ from service.mission.effects import (
 )
 from service.mission.flight import Flight
 from service.mission.news import Order
+from service.mission.phase import RETRY_S
 from service.mission.standing import Standing
 from service.mission.states import Event, State, next_state
 from service.rows import CommandRow, TransitionRow
@@ -248,6 +249,68 @@ def test_a_restart_comes_up_holding_as_it_was_and_waits_for_resume() -> None:
     assert not [effect for effect in talk.wanted if isinstance(effect, (SendWaypoint, Arm, TakeOff, Stop))]
     talk.on(Order("resume"))
     assert talk.state == State.SEARCHING
+
+
+BRAKED = {"guided": False, "stopped": True, "mode": "BRAKE"}
+
+
+def test_a_restart_has_in_hand_what_was_stopped_without_a_position_and_sends_it_home_in_time() -> None:
+    """An ArduCopter stands in a mode of its own then, and hovered there until its battery was empty."""
+    talk = restarted(State.HOLDING, **BRAKED)
+    assert talk.doing() == EnterGuided(there=True)  # stays where it is, in that mode
+    talk.failed("it was not heard", answered=False)
+    talk.pass_by(RETRY_S + 1.0)
+    assert talk.doing() == EnterGuided(there=True)
+    talk.shows(in_control=True)
+    talk.done()
+    talk.pass_by(60.0)
+    assert talk.state == State.HOLDING
+    assert not [effect for effect in talk.wanted if isinstance(effect, (SendWaypoint, Arm, TakeOff, Stop))]
+    talk.shows(battery_percent=18.0)
+    talk.pass_by(6.0)
+    assert (talk.state, talk.doing()) == (State.RETURNING, ReturnToLaunch())
+
+
+@pytest.mark.parametrize("sticks", [0.0, 0.5])
+def test_an_operators_return_takes_what_a_restart_found_in_another_mode_if_no_hand_is_on_the_sticks(
+    sticks: float,
+) -> None:
+    talk = restarted(State.HOLDING, guided=False, mode="LOITER", sticks=sticks)
+    assert talk.core.doing is None
+    did = talk.on(Order("return", 7))
+    if sticks:
+        assert "sticks" in next(each.refused for each in did if isinstance(each, Answer))
+        assert talk.core.doing is None
+        return
+    assert talk.doing() == EnterGuided()
+    talk.shows(in_control=True, guided=True, mode="GUIDED")
+    talk.done()
+    assert talk.state == State.RETURNING
+
+
+@pytest.mark.parametrize("left", [State.SEARCHING, State.RETURNING])
+def test_what_was_left_in_the_air_is_not_left_hovering_until_its_battery_is_empty(left: State) -> None:
+    """Its position is in doubt after the restart, so the search cannot go on; but it has to come home."""
+    talk = restarted(left, fix=1)
+    talk.pass_by(60.0)
+    assert (talk.state, talk.core.doing) == (State.READY, None)
+    talk.shows(battery_percent=18.0)
+    talk.tick()
+    assert talk.doing() == EnterGuided(there=True)
+    talk.shows(in_control=True)
+    talk.done()
+    talk.pass_by(20.0)
+    assert (talk.state, talk.doing()) == (State.RETURNING, ReturnToLaunch())
+
+
+def test_no_launch_against_a_hand_on_the_sticks() -> None:
+    talk = reached(State.GROUNDED, may_take_off=True)
+    talk.shows(sticks=0.5, **ON_GROUND)
+    did = talk.on(Order("launch", 7))
+    assert "sticks" in next(each.refused for each in did if isinstance(each, Answer))
+    talk.shows(sticks=0.0)
+    talk.on(Order("launch", 8))
+    assert isinstance(talk.doing(), WaitReady)
 
 
 def test_a_restart_twice_over_does_not_forget_nor_repeat_itself() -> None:

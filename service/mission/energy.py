@@ -30,6 +30,7 @@ _SLOWEST_MPS = 0.5  # slower over ground counts as not getting home at all
 _WORN = frozenset({"low", "critical", "emergency", "failed", "unhealthy"})
 _STUCK_PERCENT = 10.0  # a level that stands still while so much is used is no level
 _RISE_PERCENT = 10.0  # nor is one that has risen by more, in flight
+_LANDING_PERCENT = 3.0  # is left, beyond what a landing takes, when one begins that is not at home
 _FIRST_WORD_S = 15.0  # so long after the first look the battery may not have been told yet
 
 
@@ -302,6 +303,18 @@ class Energy:
         if self.percent is None or self.percent > needed + 0.5 * flight.reserve_percent:
             return ""
         return f"battery {self.percent:.0f} %{self._reckoned()}: no more waiting on the way home"
+
+    def falls_short(self, height_m: float, flight: FlightSettings) -> str:
+        """Why it has to land where it is, `height_m` up, or nothing: the way home needs more than there is, and hardly
+        more is left than a landing here takes. Only what is told counts, and is not contradicted by what was told."""
+        level = self.percent if self.level is None else self.level
+        cost = cost_per_s(self.percent_per_s, flight)
+        home = cost * (self.home.seconds - self.home.waits_s)
+        here = cost * max(height_m, 0.0) / flight.descent_mps
+        if level is None or not self.told or level >= home or level > here + _LANDING_PERCENT:
+            return ""
+        needs = f"the way home needs {home:.0f} %, a landing here {here:.0f} %"
+        return f"battery {level:.0f} %{self._reckoned()}: {needs}"
 
     def warning(self) -> str:
         """What the pilot and the page must know of the level, or nothing."""

@@ -16,6 +16,7 @@ from service.mission.situation import on_ground
 from service.mission.standing import Look
 
 HOME_AGAIN_S = 5.0  # after which a return to launch that is not flown is ordered again
+SHORT_S = 3.0  # for so long the battery has to say that it does not last: a single word may be wrong
 KEPT_S = 10.0  # for so long our waypoints home may be refused
 LANDS_AFTER = 3  # refusals of the return: then it lands where it is
 
@@ -43,6 +44,10 @@ class ByItself:
             if self._lands and not lands:
                 yield from warn(f"it lands where it is: {news.reason}", look)
 
+    def land(self) -> None:
+        """Not home any longer, but down."""
+        self._ordered, self._lands, self._flies = -math.inf, True, False
+
     def tick(self, look: Look) -> Iterator[Wish]:
         """Order it, and again when it is not flown."""
         waits = look.seen.telemetry.guided or not self._flies
@@ -56,8 +61,9 @@ class Homeward(Phase):
 
     def __init__(self) -> None:
         self._way: Way | None = None
-        self._begun = self._resting = self._made_room = False
+        self._begun = self._resting = self._made_room = self._down = False
         self._kept_since = self._waits_since = math.inf  # no waypoint was sent since: at all; for the others
+        self._short_since = math.inf  # the battery does not last for the way home
         self._turn = Turn()
         self._aside = Aside()
         self._by_itself = ByItself()
@@ -88,6 +94,11 @@ class Homeward(Phase):
         own layer, and only the landing leaves it."""
         if not self._begun:
             self._begin(look)
+        if why := self._falls_short(look):
+            self._way, self._resting, self._down = None, True, True
+            self._by_itself.land()
+            yield Rest()
+            yield from warn(f"{why}: it lands where it is", look)
         if not self._resting and (why := self._in_vain(look)):
             self._way, self._resting = None, True
             yield Rest()
@@ -129,6 +140,15 @@ class Homeward(Phase):
             self._way = way = Way([place, *look.chart.route(place, home)], climb=False)
             self._made_room = True
         yield from way.tick(look)
+
+    def _falls_short(self, look: Look) -> str:
+        """Why it has to come down before it falls, or nothing."""
+        t = look.seen.telemetry
+        if self._down or on_ground(t) or not (t.armed and t.in_control and look.heard()):
+            return ""
+        why = look.energy.falls_short(t.alt_home_m, look.settings.flight)
+        self._short_since = min(self._short_since, look.now) if why else math.inf
+        return why if look.now - self._short_since >= SHORT_S else ""
 
     def _in_vain(self, look: Look) -> str:
         """Why our own way home is not flown on, or nothing: it cannot be, or waiting for the others takes too long."""

@@ -1,4 +1,5 @@
-"""What nobody tells, and a person must know for that: the level of the battery, home, and the wind."""
+"""What nobody tells, and a person must know for that: the level of the battery, home, the health of the autopilot's
+position estimate, and the wind."""
 
 from __future__ import annotations
 
@@ -14,6 +15,8 @@ from service.mission.standing import Look
 
 BATTERY_S = 15.0  # after so long in the air a battery that was not told yet is one that is not told
 HOME_S = 15.0  # home is asked for every two seconds, and set anew with the arming
+HEALTH_S = 15.0
+ESTIMATES = {"ESTIMATOR_STATUS", "EKF_STATUS_REPORT"}
 WIND_S = 60.0  # after so long in the air the wind is told, or has been reckoned
 _WARNING = 4  # MAV_SEVERITY
 
@@ -24,7 +27,7 @@ class Untold:
     def __init__(self) -> None:
         self.battery = ""
         """What is reckoned of the battery's level, or nothing while that is told."""
-        self._wind_said = self._home_said = False
+        self._wind_said = self._home_said = self._health_said = False
         self._heard_at = math.inf  # first, by this process
 
     def tick(self, look: Look, wind: Wind | None) -> Iterator[Wish]:
@@ -40,6 +43,10 @@ class Untold:
         if look.seen.telemetry.home is None and not self._home_said and aloft_s > HOME_S:
             self._home_said = True
             yield from self._say("home is not told: the launch point of the area is taken for it")
+        told = look.seen.telemetry.told.keys() & ESTIMATES
+        if not told and not self._health_said and aloft_s > HEALTH_S:
+            self._health_said = True
+            yield from self._say("the health of its position estimate is not told: the GPS is all to go by")
         if not look.standing.flying:
             return
         self._wind_said &= wind is None

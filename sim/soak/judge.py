@@ -26,6 +26,7 @@ _SAME_M = 3.0
 _ORDER_S = 15.0
 _DRAIN = 1.3 * 100.0 / ground.ENDURANCE_S  # percent a second that flying takes at most
 _LEAST_PERCENT = 15.0  # the service goes home at 20
+_SPENT_PERCENT = 20.0  # from which on it may have to come down before it is home
 _UNKNOWN_S = 30.0  # without a level for so long, it is not known on the ground
 _SETTLED_S = 25.0  # a search has reached its height after so long
 _STOP_AGAIN_S = 5.0  # later than that it is one that may have been lost, which the journal counts
@@ -226,7 +227,8 @@ class Judge:
             found.append("not in this state")
         if name == "MAV_CMD_DO_REPOSITION":
             found += self._reposition(message, now)
-        if name == "MAV_CMD_NAV_LAND" and self._return_answered_at < self._state_since:
+        spent = self._level is not None and self._level[0] <= _SPENT_PERCENT
+        if name == "MAV_CMD_NAV_LAND" and self._return_answered_at < self._state_since and not spent:
             found.append("it lands where it is, and the return home was never answered")
         return [*found, *self._against_a_person(name, now), *self._on_an_unknown_battery(name, now)]
 

@@ -59,6 +59,44 @@ BAD: list[dict[str, Any]] = [
 ]
 
 
+@pytest.mark.parametrize(
+    ("given", "captured_s", "share"),
+    [
+        ({"captured_at": 1700000000.5}, 1700000000.5, 0.5),
+        ({"captured_at": 1700000000500, "clock": "unix_ms"}, 1700000000.5, 0.5),
+        ({"captured_at": 12500, "clock": "boot_ms"}, 12.5, 0.5),
+        ({"captured_at": 12.5, "clock": "boot"}, 12.5, 0.5),
+        ({"captured_at": "2023-11-14T22:13:20.5Z", "clock": "iso"}, 1700000000.5, 0.5),
+        ({"captured_at": "2023-11-14T23:13:20.5+01:00", "clock": "iso"}, 1700000000.5, 0.5),
+        ({"score_unit": "percent", "detections": [{**SEEN, "score": 50}]}, 1.0, 0.5),
+        ({"score_unit": "percent", "threshold": 50}, 1.0, 0.5),
+    ],
+)
+def test_units_are_taken_where_they_are_declared(
+    given: dict[str, Any], captured_s: float, share: float
+) -> None:
+    report = Report.model_validate({**LEAST, "detections": [{**SEEN, "score": 0.5}], **given})
+    assert report.captured_s == captured_s
+    assert report.share(report.detections[0].score) == share or report.threshold_share == share
+
+
+@pytest.mark.parametrize(
+    ("given", "hint"),
+    [
+        ({"captured_at": 1700000000500}, 'for milliseconds say "clock": "unix_ms"'),
+        ({"captured_at": "2023-11-14T22:13:20Z"}, 'for an ISO 8601 time say "clock": "iso"'),
+        ({"captured_at": "2023-11-14T22:13:20", "clock": "iso"}, "has no offset; end it with Z for UTC"),
+        ({"captured_at": "yesterday", "clock": "iso"}, "is no ISO 8601 time"),
+        ({"detections": [{**SEEN, "score": 87}]}, 'for per cent say "score_unit": "percent"'),
+        ({"threshold": 40}, 'for per cent say "score_unit": "percent"'),
+    ],
+)
+def test_units_that_are_not_declared_are_refused_with_the_hint(given: dict[str, Any], hint: str) -> None:
+    with pytest.raises(ValidationError) as refused:
+        Report.model_validate({**LEAST, **given})
+    assert hint in str(refused.value)
+
+
 @pytest.fixture(scope="module")
 def shipped() -> jsonschema.Draft202012Validator:
     schema = json.loads(SHIPPED.read_text(encoding="utf-8"))

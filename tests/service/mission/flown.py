@@ -65,6 +65,7 @@ def telemetry(**changes: Any) -> Telemetry:
         fix=3,
         satellites=12,
         battery_percent=90.0,
+        told={"EKF_STATUS_REPORT": START},
     )
     return replace(usual, **changes)
 

@@ -261,6 +261,16 @@ def test_a_home_that_is_not_told_is_said_once() -> None:
     assert [each.text for each in did if isinstance(each, Tell)].count(said) == 1
 
 
+def test_an_estimate_whose_health_was_never_told_is_said_once() -> None:
+    """What stops being told holds; what never was is no objection, and a person has to know."""
+    said = "search: the health of its position estimate is not told: the GPS is all to go by"
+    for told, times in (({}, 1), ({"EKF_STATUS_REPORT": START}, 0), ({"ESTIMATOR_STATUS": START}, 0)):
+        talk = searching()
+        talk.shows(told=told)
+        did = talk.pass_by(60.0)
+        assert [each.text for each in did if isinstance(each, Tell)].count(said) == times
+
+
 def test_what_a_restart_in_the_air_has_not_heard_yet_is_not_called_untold() -> None:
     talk = Talk(flight=Flight(flown=True, carried_s=300.0, left_at=START), home=None, battery_percent=None)
     talk.pass_by(5.0)

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from service.mavlink.events import Stalled
-from service.mission.effects import EnterGuided, Land, ReturnToLaunch, SendWaypoint, Tell
-from service.mission.homeward import HOME_AGAIN_S, KEPT_S, LANDS_AFTER
+from service.mission.effects import EnterGuided, Land, Note, ReturnToLaunch, SendWaypoint, Tell
+from service.mission.homeward import HOME_AGAIN_S, KEPT_S, LANDS_AFTER, SHORT_S
 from service.mission.limits import Objection
 from service.mission.news import Done, NotSent, Order
 from service.mission.states import State
@@ -154,6 +154,47 @@ def test_a_return_that_is_not_answered_while_the_position_is_in_doubt_does_not_b
     talk.failed("it answered DENIED")
     talk.pass_by(HOME_AGAIN_S + 2.0)
     assert talk.doing() == Land()
+
+
+@pytest.mark.parametrize("by_itself", [False, True])
+def test_an_aircraft_whose_battery_does_not_last_lands_before_it_falls(by_itself: bool) -> None:
+    """A battery that drained while it flew home: it fell from the sky beside its way."""
+    talk = behind(full_battery_s=200.0)
+    if not by_itself:
+        talk.done()
+    else:
+        kept(talk, "link", int(KEPT_S) + 3)
+        assert talk.doing() == ReturnToLaunch()
+        talk.done()
+        talk.shows(guided=False, mode="RTL")
+    talk.shows(battery_percent=30.0)  # less than the way, and more than a landing needs
+    talk.pass_by(SHORT_S + 2.0)
+    assert Land() not in talk.wanted
+    talk.shows(battery_percent=9.0)
+    talk.pass_by(SHORT_S + 1.0)
+    assert talk.doing() == Land()
+    assert "it lands where it is" in "".join(each.text for each in talk.wanted if isinstance(each, Note))
+    talk.done()
+    talk.shows(guided=False, mode="LAND")
+    talk.pass_by(4 * HOME_AGAIN_S)
+    assert talk.wanted.count(Land()) == 1
+
+
+def test_a_single_word_of_a_low_battery_does_not_land_it() -> None:
+    talk = behind(full_battery_s=200.0)
+    talk.done()
+    talk.shows(battery_percent=9.0)
+    talk.pass_by(1.0)
+    talk.shows(battery_percent=60.0)
+    talk.pass_by(60.0)
+    assert Land() not in talk.wanted
+
+
+def test_a_battery_that_lasts_for_the_way_home_is_flown_home_with() -> None:
+    talk = behind(full_battery_s=7200.0)
+    talk.shows(battery_percent=9.0)
+    talk.pass_by(60.0)
+    assert Land() not in talk.wanted
 
 
 def test_a_return_that_fails_as_nobody_hears_it_does_not_become_a_landing() -> None:

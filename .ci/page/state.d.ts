@@ -35,6 +35,12 @@ interface AircraftState {
   footprint: FootprintState;
 }
 
+interface BatteryState {
+  voltage_v: number | null;
+  current_a: number | null;
+  consumed_mah: number | null;
+}
+
 interface ChoiceState {
   name: string;
   distance_m: number | null;
@@ -204,6 +210,7 @@ interface RunState {
   flight_left_s: number | null;
   battery_percent: number | null;
   battery_doubt: string | null;
+  battery: BatteryState | null;
   mode: string | null;
   reason: string;
   options: OptionState[];

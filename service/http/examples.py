@@ -81,6 +81,7 @@ STATE = answers(
         "flight_left_s": 1820.0,
         "battery_percent": 91.0,
         "battery_doubt": None,
+        "battery": {"voltage_v": 16.1, "current_a": 11.8, "consumed_mah": 420.0},
         "mode": "AUTO_LOITER",
         "reason": "ROI 3: 12 % of the mass, 240 m, best rate",
         "pose": {

@@ -152,12 +152,25 @@ function places(unseen) {
   return more ? `${told}; and ${more} more` : told;
 }
 
+/** What is measured of the battery: volts, amperes, and what was used.
+ * @param {RunState["battery"]} cells
+ * @returns {string} */
+function measured(cells) {
+  const told = [
+    cells?.voltage_v != null ? `${cells.voltage_v.toFixed(1)} V` : "",
+    cells?.current_a != null ? `${cells.current_a.toFixed(1)} A` : "",
+    cells?.consumed_mah != null ? `${Math.round(cells.consumed_mah)} mAh used` : "",
+  ];
+  return told.filter(Boolean).join(", ");
+}
+
 /** Each fact: name, value, and how bad it is.
  * @param {RunState} state
  * @returns {string[][]} */
 function facts({
   battery_percent,
   battery_doubt,
+  battery: cells,
   flight_left_s,
   flight_time_s,
   sorties,
@@ -183,6 +196,7 @@ function facts({
   const past = link === null; // a replay knows only what was written down
   return [
     ["battery", ...battery],
+    ...(measured(cells) ? [["voltage, current", measured(cells), ""]] : []),
     ["time left", ...left],
     ["link", ...heard(link)],
     ["detector", ...looks(detector, reports)],

@@ -149,6 +149,7 @@ class ReplayView(BaseView):
             "flight_left_s": None,
             "battery_percent": None,
             "battery_doubt": None,
+            "battery": None,
             "mode": flight.mode and mode_title(flight.mode),
             "reason": "starting" if decision is None else decision.reason,
             "options": option_states(() if decision is None else decision.options),

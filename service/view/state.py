@@ -16,6 +16,7 @@ from service.evidence.counts import Counts
 from service.evidence.found import Found, Suspect
 from service.evidence.observe import FramePose
 from service.geometry import LatLon
+from service.mavlink.telemetry import Telemetry
 from service.mission.states import State
 from service.places import Coordinates, written
 from service.reasons import Option
@@ -206,6 +207,23 @@ class HeardState(TypedDict):
     notes: list[str]
 
 
+class BatteryState(TypedDict):
+    """What else the autopilot tells of the battery that is worst off: volts, amperes, milliampere hours used."""
+
+    voltage_v: float | None
+    current_a: float | None
+    consumed_mah: float | None
+
+
+def battery_state(t: Telemetry) -> BatteryState:
+    """What is told of the battery beside its level."""
+    return {
+        "voltage_v": t.battery_voltage_v,
+        "current_a": t.battery_current_a,
+        "consumed_mah": t.battery_consumed_mah,
+    }
+
+
 class DrawnState(TypedDict):
     """How often the regions of interest were drawn again, and what was new the last time."""
 
@@ -277,6 +295,7 @@ class RunState(TypedDict):
     flight_left_s: float | None
     battery_percent: float | None
     battery_doubt: str | None
+    battery: BatteryState | None
     mode: str | None
     reason: str
     options: list[OptionState]

@@ -72,6 +72,11 @@ def test_the_strip_says_it_in_words_and_what_happens_next(watch: Watch, search: 
     search.run.tell(link={"up": True, "silent_s": 0.2, "received": 0.99, "round_trip_s": 5.2})
     expect(strip).to_contain_text("Linkslowanswers after 5 s")
     expect(page.locator("#facts")).to_contain_text("up, answers after 5 s")
+    expect(page.locator("#facts")).not_to_contain_text("voltage")
+    search.run.tell(battery={"voltage_v": 15.24, "current_a": None, "consumed_mah": 1204.0})
+    expect(page.locator("#facts")).to_contain_text("voltage, current15.2 V, 1204 mAh used")
+    search.run.tell(battery_doubt="the battery's level is not told any longer: reckoned to be 18 %")
+    expect(page.locator("#facts")).to_contain_text("reckoned to be 18 %")
 
 
 def test_what_cannot_be_seen_from_the_air_is_named_with_the_likeliest_first(

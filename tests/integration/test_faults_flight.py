@@ -50,6 +50,7 @@ def test_it_flies_home_while_the_battery_has_what_that_needs(tmp_path: Path) -> 
         scene.searching()
         row = scene.reaches("RETURNING", "the way home")
         assert "needs" in row.body["reason"]
+        assert 5.0 < scene.door.get("/api/state").json()["battery"]["voltage_v"] < 30.0
         assert scene.control.state()["battery_percent"] > 25  # well before the fixed minimum
         code, report = scene.ends()
         assert code == 3

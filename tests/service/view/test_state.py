@@ -27,7 +27,15 @@ from tests.service.export.recorded import SETTINGS, record
 from tests.service.http.door import FakeRun
 from tests.service.mission.flown import START, reached, telemetry
 
-KNOWN_LIVE_ALONE = {"flight_left_s", "battery_percent", "battery_doubt", "link", "detector", "wind"}
+KNOWN_LIVE_ALONE = {
+    "flight_left_s",
+    "battery_percent",
+    "battery_doubt",
+    "battery",
+    "link",
+    "detector",
+    "wind",
+}
 """What a journal does not keep."""
 
 

@@ -32,17 +32,21 @@ def locked(path: Path) -> Iterator[None]:
         other.close()
 
 
-@pytest.mark.parametrize("command", ["hold", "abort"])
+@pytest.mark.parametrize("command", ["hold", "abort", "return"])
 def test_an_order_to_stop_waits_for_no_disk(command: str, tmp_path: Path) -> None:
+    becomes = {"hold": State.HOLDING, "abort": State.ABORTED, "return": State.RETURNING}
+
     async def fly() -> None:
         async with aloft(tmp_path) as mission:
             with locked(mission.journal.path):
                 rows = len(list(read_rows(mission.journal.path, "order")))
                 await asyncio.wait_for(mission.order(command), 5.0)
-                assert mission.state == {"hold": State.HOLDING, "abort": State.ABORTED}[command]
+                assert mission.state == becomes[command]
                 assert len(list(read_rows(mission.journal.path, "order"))) == rows  # it is not on disk yet
                 if command == "hold":
                     await until(mission, lambda: mission.vehicle.telemetry.ground_speed_mps < 0.5)
+                if command == "return":  # which its autopilot flies, without a row of ours
+                    await until(mission, lambda: mission.vehicle.telemetry.mode == "AUTO_RTL")
 
     asyncio.run(fly())
 

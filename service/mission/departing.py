@@ -250,8 +250,12 @@ class TakingOff(Phase):
         self._begun = False
         self._turn = Turn()
         self._failed: Failed | None = None
-        self._patient_until = 0.0
+        self._patient_until = self._again_at = 0.0
         self._doubted_since = math.inf
+        self._out_of: str | None = (
+            None  # the mode that it leaves, and no other that a pilot selects meanwhile
+        )
+        self._until = math.inf
 
     def tick(self, look: Look) -> Iterator[Wish]:
         """The next step, once the position is trusted and the others leave room for it. After one that failed, what the
@@ -275,9 +279,14 @@ class TakingOff(Phase):
         if self._failed is not None:
             if look.now >= self._patient_until:
                 yield self._in_vain(self._failed.reason, look)
-        elif not look.busy and self._left:
-            step, mode = self._left[0], look.seen.telemetry.mode
-            yield replace(step, out_of=mode) if isinstance(step, EnterGuided) else step
+        elif not look.busy and self._left and look.now >= self._again_at:
+            step = self._left[0]
+            if isinstance(step, EnterGuided):
+                if self._out_of is None:
+                    self._out_of = look.seen.telemetry.mode
+                    self._until = look.now + look.settings.link.connect_timeout_s
+                step = replace(step, out_of=self._out_of)
+            yield step
 
     def _wait(self, doubts: str, look: Look) -> Iterator[Wish]:
         """What would hold it in the air keeps it on the ground, for as long as arming would be tried."""
@@ -289,7 +298,10 @@ class TakingOff(Phase):
 
     def on(self, news: News, look: Look) -> Iterator[Wish]:
         """A step is done, or was in vain."""
-        if isinstance(news, Failed):
+        unheard = isinstance(news, Failed) and not news.answered and isinstance(news.action, EnterGuided)
+        if unheard and look.now < self._until:  # a link that was silent for a moment ends no run
+            self._again_at = look.now + RETRY_S
+        elif isinstance(news, Failed):
             self._failed, self._patient_until = news, look.now + RETRY_S
         elif isinstance(news, Done):
             del self._left[0]

@@ -23,6 +23,23 @@ def test_a_short_loss_of_gps_holds_and_passes(tmp_path: Path) -> None:
         scene.moves_again()
 
 
+@pytest.mark.parametrize("flavor", ["px4", "ardupilot"])
+def test_an_aircraft_that_has_lost_its_gps_stands_and_does_not_fly_on(flavor: str, tmp_path: Path) -> None:
+    """By where it truly is: one flew on to its last waypoint at 5.6 m/s, since nobody sent a stop."""
+    with flight(tmp_path, flavor, speedup=4.0) as scene:
+        scene.searching()
+        scene.control.fault("gps_lost", seconds=20.0, reckons_s=30.0)
+        scene.reaches("HOLDING", "the GPS has no 3D fix", "calls not healthy: GPS")
+        scene.fly(8.0)
+        speeds = []
+        for _ in range(4):
+            speeds.append(scene.control.state()["speed"])
+            scene.fly(1.0)
+        assert max(speeds) < 1.0
+        scene.reaches("SEARCHING", "the position is good again")
+        scene.moves_again()
+
+
 def test_a_jump_of_the_position_holds_and_what_is_reported_meanwhile_is_not_believed(tmp_path: Path) -> None:
     with flight(tmp_path, settle_s=40.0) as scene:
         scene.searching()

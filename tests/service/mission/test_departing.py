@@ -313,6 +313,25 @@ def test_no_launch_against_a_hand_on_the_sticks() -> None:
     assert isinstance(talk.doing(), WaitReady)
 
 
+def test_a_link_that_was_silent_for_a_moment_ends_no_take_off_and_a_pilots_mode_is_not_left() -> None:
+    """The service stood still while it compiled; the run ended, on the ground."""
+    talk = reached(State.TAKEOFF, mode="STABILIZE", guided=False, **ON_GROUND)
+    talk.tick()
+    for _ in range(5):
+        step = talk.doing()
+        assert isinstance(step, EnterGuided)
+        assert step.out_of == "STABILIZE"
+        talk.failed("the service stood still and has not heard the vehicle since", answered=False)
+        assert talk.state == State.TAKEOFF
+        talk.shows(mode="LOITER")  # told, and not yet taken in
+        talk.pass_by(RETRY_S + 0.5)
+    for _ in range(200):
+        if talk.core.doing is not None:
+            talk.failed("the vehicle has not been heard", answered=False)
+        talk.pass_by(RETRY_S + 0.5)
+    assert talk.state == State.ABORTED
+
+
 def test_a_restart_twice_over_does_not_forget_nor_repeat_itself() -> None:
     first = restarted(State.YIELDED)
     standing = replace(first.core.standing)

@@ -36,7 +36,7 @@ from service.mission.phase import (
     Wish,
     warn,
 )
-from service.mission.situation import hovering, on_ground
+from service.mission.situation import hovering, on_ground, standing_still
 from service.mission.standing import LEAST_PATIENCE_WALL_S, Look, Standing
 from service.mission.states import Event, State
 from service.rows import CommandRow
@@ -115,7 +115,14 @@ class Handover:
     def tick(self, look: Look) -> Iterator[Wish]:
         """Take it when it is there to be taken."""
         t = look.seen.telemetry
-        if not hovering(t) or look.busy or look.now < self._not_before:
+        low = look.flight.flown and bool(
+            look.energy_low()
+        )  # what was left in the air must not hover until it falls
+        there = standing_still(t) if low else hovering(t)
+        if not there or look.busy or look.now < self._not_before:
+            return
+        if low:
+            yield EnterGuided(there=True)
             return
         why, before = look.helm.unfit(t, look.seen.others), self._unfit
         self._unfit = why
@@ -124,8 +131,8 @@ class Handover:
         elif why:
             if not before:
                 yield from warn(f"it is not taken over: {why}", look)
-        elif not (doubts := look.helm.doubts(t, look.now)) or (look.flight.flown and look.energy_low()):
-            yield EnterGuided(there=True)  # what was left in the air must not hover there until it falls
+        elif not (doubts := look.helm.doubts(t, look.now)):
+            yield EnterGuided(there=True)
         elif not self._told:  # what is not heard yet is no fault, and no reason to begin
             self._told = True
             yield Note(f"the search waits for the position: {'; '.join(doubts)}")

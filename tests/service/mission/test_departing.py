@@ -289,9 +289,12 @@ def test_an_operators_return_takes_what_a_restart_found_in_another_mode_if_no_ha
 
 
 @pytest.mark.parametrize("left", [State.SEARCHING, State.RETURNING])
-def test_what_was_left_in_the_air_is_not_left_hovering_until_its_battery_is_empty(left: State) -> None:
-    """Its position is in doubt after the restart, so the search cannot go on; but it has to come home."""
-    talk = restarted(left, fix=1)
+@pytest.mark.parametrize("why_not", [{"fix": 1}, BRAKED], ids=["in doubt", "in BRAKE"])
+def test_what_was_left_in_the_air_is_not_left_hovering_until_its_battery_is_empty(
+    left: State, why_not: dict[str, Any]
+) -> None:
+    """Its position is in doubt after the restart, or its mode is not the search's; but it has to come home."""
+    talk = restarted(left, **why_not)
     talk.pass_by(60.0)
     assert (talk.state, talk.core.doing) == (State.READY, None)
     talk.shows(battery_percent=18.0)

@@ -115,9 +115,8 @@ class Handover:
     def tick(self, look: Look) -> Iterator[Wish]:
         """Take it when it is there to be taken."""
         t = look.seen.telemetry
-        low = look.flight.flown and bool(
-            look.energy_low()
-        )  # what was left in the air must not hover until it falls
+        left_aloft = look.flight.flown and not self._between  # which must not hover there until it falls
+        low = left_aloft and bool(look.energy_low())
         there = standing_still(t) if low else hovering(t)
         if not there or look.busy or look.now < self._not_before:
             return

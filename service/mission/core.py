@@ -461,6 +461,9 @@ class MissionCore:
         """A waypoint must not be sent: hover for what it would be fatal to fly on with, else try again."""
         phase = self._phase
         self._too_low += objection.cause == "ground"
+        if objection.cause == "limits" and phase.elsewhere(self._look()):
+            self._emit(Note(f"waypoint not sent: {objection.reason}; another way is planned", _WARNING))
+            return
         if objection.cause in ("position", "limits") or self._too_low > GIVEN_UP_AFTER:
             self._too_low = 0
             self._want([Hold(objection.cause if objection.cause != "ground" else "limits", objection.reason)])

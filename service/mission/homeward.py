@@ -17,6 +17,7 @@ from service.mission.standing import Look
 
 HOME_AGAIN_S = 5.0  # after which a return to launch that is not flown is ordered again
 SHORT_S = 3.0  # for so long the battery has to say that it does not last: a single word may be wrong
+REROUTE_S = 20.0  # for so long a way home that was planned anew has to be one that may be flown
 KEPT_S = 10.0  # for so long our waypoints home may be refused
 LANDS_AFTER = 3  # refusals of the return: then it lands where it is
 
@@ -63,6 +64,7 @@ class Homeward(Phase):
         self._way: Way | None = None
         self._begun = self._resting = self._made_room = self._down = False
         self._kept_since = self._waits_since = math.inf  # no waypoint was sent since: at all; for the others
+        self._rerouted_at = -math.inf
         self._short_since = math.inf  # the battery does not last for the way home
         self._turn = Turn()
         self._aside = Aside()
@@ -80,6 +82,14 @@ class Homeward(Phase):
         elif objection.cause != "ground":
             self._kept_since = min(self._kept_since, look.now)
         self.lost(look)
+
+    def elsewhere(self, look: Look) -> bool:
+        """It may have left its way, to make room or in a wind: another one is planned from where it is now, but not
+        again and again."""
+        if self._resting or self._way is None or look.now - self._rerouted_at < REROUTE_S:
+            return False
+        self._rerouted_at, self._begun, self._way = look.now, False, None
+        return True
 
     def on(self, news: News, look: Look) -> Iterator[Wish]:
         """A point is on its way, the ground has changed, or what became of the autopilot's own return."""

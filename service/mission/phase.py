@@ -205,6 +205,10 @@ class Phase:
         """A waypoint was not sent; the phase goes on."""
         self.lost(look)
 
+    def elsewhere(self, look: Look) -> bool:
+        """Whether it goes another way than the one whose next waypoint may not be flown to from here."""
+        return False
+
 
 def say(said: str, look: Look) -> Iterator[Wish]:
     """For whoever reads the console, and for the pilot."""

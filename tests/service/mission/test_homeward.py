@@ -104,6 +104,21 @@ def test_the_others_are_waited_for_on_the_way_home_until_the_energy_or_the_patie
     assert talk.doing() == ReturnToLaunch()
 
 
+def test_a_way_home_that_it_has_left_is_planned_anew_and_not_flown_by_the_autopilot_past_the_others() -> None:
+    """It had made room for another, from where the next point of its way lay behind an excluded area: it held, and the
+    autopilot's own return led it 12 m from a third."""
+    talk = behind()
+    first = talk.doing()
+    talk.on(NotSent(first, Objection("limits", "the waypoint lies behind an excluded area")))
+    assert talk.state == State.RETURNING
+    talk.tick()
+    again = talk.doing()
+    assert isinstance(again, SendWaypoint)
+    assert talk.core.standing.direct is False
+    talk.on(NotSent(again, Objection("limits", "the waypoint lies behind an excluded area")))
+    assert talk.state == State.HOLDING  # not for ever
+
+
 def test_a_low_battery_alone_does_not_end_our_own_way_around_what_is_excluded() -> None:
     talk = behind()
     talk.done()

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import ctypes
 import faulthandler
+import gc
 import logging
 import os
 import signal
@@ -70,6 +71,8 @@ async def serve(end: socket.socket, hello: Hello) -> None:
         while not server.started and not serving.done():  # noqa: ASYNC110 - uvicorn has nothing to wait for
             await asyncio.sleep(0.01)
         if server.started:
+            gc.collect()
+            gc.freeze()  # what stays for good is not gone through again and again, which takes a tenth of a second
             channel.send({"note": "open"})
         await asyncio.wait([serving, hearing], return_when=asyncio.FIRST_COMPLETED)
     finally:

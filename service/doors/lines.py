@@ -19,8 +19,8 @@ from service.journal import JournalLost
 log = logging.getLogger("roisearch")
 SubmitAll = Callable[[Sequence[Report]], Awaitable[list[Receipt]]]
 _MOST_CHARACTERS = 300
-_MOST_LINES = 100  # read at once, before whatever else goes on has its turn
-_MOST_AT_ONCE = 1 << 14  # bytes of them, unless a single line has more
+_MOST_LINES = 25  # read at once, before whatever else goes on has its turn
+_MOST_AT_ONCE = 1 << 12  # bytes of them, unless a single line has more
 LONGEST_LINE = 1 << 18
 
 

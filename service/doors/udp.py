@@ -18,7 +18,7 @@ log = logging.getLogger("roisearch")
 _BUFFER_BYTES = 4 << 20  # a burst waits in the kernel's memory rather than being lost
 _MOST_REPLY_BYTES = 60_000
 _MOST_WAITING = 256  # datagrams; more are dropped: who gets no receipt sends again
-_ANSWERED_AT_ONCE = 4  # datagrams; the flight has taken one in while the next is read
+_ANSWERED_AT_ONCE = 2  # datagrams; the flight has taken one in while the next is read
 
 
 def bind_udp(address: str) -> socket.socket:

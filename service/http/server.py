@@ -27,7 +27,7 @@ _MOST_HEADER_BYTES = 16_384
 _READ_BYTES = 16_384
 _WISH_BYTES = 1_024
 """Read at a time of a watcher, which has nothing to say but a time."""
-_ACCEPTED_AT_ONCE = 16
+_ACCEPTED_AT_ONCE = 8
 """Connections, before whoever is connected already has a turn."""
 _QUEUE_OF_NEWCOMERS = 256
 _KEEP_ALIVE_S = 15

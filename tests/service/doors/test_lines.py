@@ -62,7 +62,7 @@ def test_many_lines_are_taken_in_part_by_part_and_others_have_their_turn() -> No
     receipts = said(asyncio.run(talk()))
     assert [each["status"] for each in receipts] == ["accepted"] * 1200 + ["refused"] * 1000
     assert [each["id"] for each in receipts[:1200]] == [f"f{number}" for number in range(1200)]
-    assert sizes == [100] * 12
+    assert sizes == [25] * 48
     assert turns >= 20
 
 

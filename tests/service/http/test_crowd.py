@@ -79,7 +79,7 @@ def test_a_storm_of_newcomers_has_few_turns_before_who_is_connected_has_one(
                 turns.append(len(entered) - before)
         return turns
 
-    assert max(asyncio.run(talk())) <= 16
+    assert max(asyncio.run(talk())) <= 8
 
 
 def test_a_watcher_is_read_little_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,7 @@ from service.view.maps import draw_map, geojson_text, map_text
 from service.view.scene import SearchGround
 
 _PR_SET_PDEATHSIG = 1
-_NICENESS = 10
+_NICENESS = 5
 
 
 @dataclass(frozen=True)

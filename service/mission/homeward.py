@@ -115,7 +115,7 @@ class Homeward(Phase):
             yield from warn(f"{why}: the autopilot flies home by itself", look)
         if self._way is not None and not self._resting:  # who lands already makes room by being down
             yield from self._fly(self._way, look)
-            if not self._way.flown:
+            if self._way is None or not self._way.flown:  # a point that may not be flown to leads elsewhere
                 return
         t = look.seen.telemetry
         if not self._resting and t.guided and t.armed and not look.standing.direct:

@@ -23,6 +23,7 @@ from service.evidence.sensors import Profile
 from service.geometry import LatLon
 from service.known import Withdrawn
 from service.mavlink.modes import mode_title
+from service.mavlink.telemetry import Telemetry
 from service.mission.mission import Mission
 from service.mission.situation import on_ground
 from service.mission.states import State
@@ -37,6 +38,7 @@ from service.view.feed import Moment
 from service.view.next import STATE_WORDS, NextState
 from service.view.state import (
     AircraftState,
+    BatteryState,
     DetectorState,
     EstimateState,
     HeardState,
@@ -44,7 +46,6 @@ from service.view.state import (
     ReportsState,
     RunState,
     WindState,
-    battery_state,
     known_deg,
     option_states,
     pose_state,
@@ -403,4 +404,13 @@ def link_state(mission: Mission) -> LinkState:
         "silent_s": silent if math.isfinite(silent) else None,
         "received": mission.vehicle.received,
         "round_trip_s": None if round_trip is None or math.isinf(round_trip) else round_trip,
+    }
+
+
+def battery_state(t: Telemetry) -> BatteryState:
+    """What is told of the battery beside its level."""
+    return {
+        "voltage_v": t.battery_voltage_v,
+        "current_a": t.battery_current_a,
+        "consumed_mah": t.battery_consumed_mah,
     }

@@ -16,7 +16,6 @@ from service.evidence.counts import Counts
 from service.evidence.found import Found, Suspect
 from service.evidence.observe import FramePose
 from service.geometry import LatLon
-from service.mavlink.telemetry import Telemetry
 from service.mission.states import State
 from service.places import Coordinates, written
 from service.reasons import Option
@@ -213,15 +212,6 @@ class BatteryState(TypedDict):
     voltage_v: float | None
     current_a: float | None
     consumed_mah: float | None
-
-
-def battery_state(t: Telemetry) -> BatteryState:
-    """What is told of the battery beside its level."""
-    return {
-        "voltage_v": t.battery_voltage_v,
-        "current_a": t.battery_current_a,
-        "consumed_mah": t.battery_consumed_mah,
-    }
 
 
 class DrawnState(TypedDict):

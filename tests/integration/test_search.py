@@ -89,7 +89,7 @@ def test_nothing_is_armed_on_a_given_link_without_takeoff(tmp_path: Path) -> Non
 def test_the_door_answers_bad_reports_in_words_and_counts_none_of_them_twice(tmp_path: Path) -> None:
     words = service_words(write_area(tmp_path), tmp_path / "runs", "--speedup", "10")
     with running(*words) as service:
-        door = httpx.Client(base_url=service.wait_for(r"listening on (http://\S+)").group(1))
+        door = httpx.Client(base_url=service.wait_for(r"listening on (http://\S+)").group(1), timeout=30.0)
         assert door.get("/healthz").text == "ok\n"
         service.wait_for("SEARCHING")
         state = TypeAdapter(RunState).validate_json(door.get("/api/state").content)

@@ -119,6 +119,24 @@ def test_a_way_home_that_it_has_left_is_planned_anew_and_not_flown_by_the_autopi
     assert talk.state == State.HOLDING  # not for ever
 
 
+def test_a_way_home_that_may_not_be_flown_on_from_here_is_planned_anew_in_the_same_tick(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The waypoint is judged when it is wanted, and again before it is sent: both ways lead to another way."""
+    talk = reached(State.SEARCHING, {"flight": {"altitude_m": 15.0, "full_battery_s": 1200.0}})
+    talk.shows(lat=BEHIND[0], lon=BEHIND[1])
+    talk.flew()
+    refusals = iter([Objection("limits", "the waypoint lies behind an excluded area")])
+    monkeypatch.setattr(type(talk.core.helm), "objection", lambda *_: next(refusals, None))
+    talk.on(Order("return"))
+    talk.tick()
+    assert next(refusals, None) is None
+    assert talk.state == State.RETURNING
+    assert any("another way is planned" in each.text for each in talk.wanted if isinstance(each, Note))
+    talk.tick()
+    assert isinstance(talk.doing(), SendWaypoint)
+
+
 def test_a_low_battery_alone_does_not_end_our_own_way_around_what_is_excluded() -> None:
     talk = behind()
     talk.done()

@@ -43,6 +43,7 @@ def test_an_aircraft_that_has_lost_its_gps_stands_and_does_not_fly_on(flavor: st
 def test_a_jump_of_the_position_holds_and_what_is_reported_meanwhile_is_not_believed(tmp_path: Path) -> None:
     with flight(tmp_path, settle_s=40.0) as scene:
         scene.searching()
+        scene.map()  # the first takes a second or two, in which ten times as much is flown
         scene.control.fault("gps_jump", north=40.0)
         held = scene.reaches("HOLDING", "the position jumped by")
         scene.fly(6.0)  # it brakes, by its autopilot's own means; told again while that is not acknowledged

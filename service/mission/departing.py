@@ -258,9 +258,8 @@ class TakingOff(Phase):
         self._failed: Failed | None = None
         self._patient_until = self._again_at = 0.0
         self._doubted_since = math.inf
-        self._out_of: str | None = (
-            None  # the mode that it leaves, and no other that a pilot selects meanwhile
-        )
+        # the mode that it leaves, and no other that a pilot selects meanwhile
+        self._out_of: str | None = None
         self._until = math.inf
 
     def tick(self, look: Look) -> Iterator[Wish]:

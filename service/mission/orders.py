@@ -35,9 +35,6 @@ STOPPING = ("hold", "return", "home", "finish", "abort", "leave")
 OFFERED = ("hold", "resume", "return", "launch", "replace", "finish")
 """Orders that a page has a button for."""
 _MAY_LAUNCH = (State.READY, State.GROUNDED, State.YIELDED, State.HOLDING)
-_TAKEN_UP = {State.YIELDED: ("resume", "return", "launch"), State.HOLDING: ("resume", "launch")}
-"""What takes an aircraft that a pilot may have, in these states; a launch does in every one. Finish and abort send a
-yielded one nothing."""
 _BEFOREHAND = ("hold", "return", "finish")  # mean something to an aircraft that is not heard yet
 STICKS = 0.15  # part of their way, from which on deflected sticks are a hand on them
 
@@ -80,7 +77,7 @@ def ordered(order: Order, look: Look) -> Iterator[Wish]:
             first = state in (State.YIELDED, State.HOLDING) and not ours
         case "return":
             wish = Happen(Event.RETURN, ASKED, stopped="the operator asked to return")
-            first = state in (State.YIELDED, State.HOLDING) and not t.in_control and not down
+            first = _taken_home(look) and not down
         case "launch":
             yield Answer(order.ticket)  # getting ready may take long
             yield Pending(order.command, WaitReady(), (climb(look),), 0)
@@ -165,8 +162,8 @@ def _refusal(command: str, look: Look) -> str:
     t = look.seen.telemetry
     if why := _senseless(command, look):
         return why
-    takes = command in _TAKEN_UP.get(look.standing.state, ("launch",))
-    takes |= command == "return" and look.standing.state == State.HOLDING and not t.in_control
+    resumes = command == "resume" and look.standing.state in (State.YIELDED, State.HOLDING)
+    takes = command == "launch" or resumes or (command == "return" and _taken_home(look))
     if takes and (t.sticks or 0.0) > STICKS:
         return "the pilot's sticks are not in the middle; the pilot has the aircraft"
     if command == "launch":
@@ -198,6 +195,12 @@ def _senseless(command: str, look: Look) -> str:
     if command == "replace" and state != State.GROUNDED:
         return f"another aircraft comes between two sorties, in {State.GROUNDED}; this one is {state}"
     return ""
+
+
+def _taken_home(look: Look) -> bool:
+    """A return takes the aircraft: its pilot has it, or a restart has not got it in hand yet."""
+    state = look.standing.state
+    return state == State.YIELDED or (state == State.HOLDING and not look.seen.telemetry.in_control)
 
 
 def _ours(look: Look) -> bool:

@@ -30,7 +30,7 @@ from sim.soak.audit import Target, audit, wrongly_found
 from sim.soak.clocked import SteppedClock
 from sim.soak.eyes import Eyes, grown
 from sim.soak.judge import AFTER, OPERATOR, Judge
-from sim.soak.kinds import AT_BOOT, GROUNDS, KINDS
+from sim.soak.kinds import AT_BOOT, GROUNDS, KINDS, OF_THE_MOCK
 from sim.soak.plan import HOLD, HOME, Fault, Plan
 from sim.soak.process import Process
 from sim.soak.tap import Tap
@@ -156,6 +156,7 @@ class SoakFlight:
         words = ["--area", str(area), "--config", str(settings), "--runs", str(self._runs)]
         words += ["--connect", self._tap.url, *(self._wing.words if self._wing else [])]
         words += ["--takeoff", "--seed", str(self.plan.seed), *over]
+        self._words = words
         self._launch(words)
         stack.callback(lambda: self._service.stop())
 
@@ -261,7 +262,7 @@ class SoakFlight:
         """Let one fault come and pass."""
         kind, eyes, options = fault.kind, self._eyes, dict(fault.options)
         if kind == "killed":
-            self._kill()
+            self._kill(by_its_unit=options["go_on"])
         elif kind in ("killed_while_held", "killed_while_yielded"):
             self._stop_and_kill(kind == "killed_while_held", fault.seconds)
         elif kind == "clock_steps":
@@ -295,8 +296,13 @@ class SoakFlight:
             setattr(eyes, switch, False)
         elif kind in ("clue", "exclude"):
             self._tell_news(kind, fault)
+        elif kind == "strangers":
+            with Process(["sim.soak.attacks", options["way"], self._url]):
+                self._pass(fault.seconds)
         elif kind == "journal_locked":
             self._lock_the_journal(fault.seconds)
+        elif kind == "journal_slow":
+            self._slow_the_journal(fault.seconds)
         elif kind == "operator_holds":
             self._order("hold")
             self.judge.stopped(self._now(), OPERATOR)
@@ -324,9 +330,19 @@ class SoakFlight:
             self._pass(seconds)
             other.execute("ROLLBACK")
 
+    def _slow_the_journal(self, seconds: float) -> None:
+        """Every write waits for seconds, as on a worn-out card; a person stops the aircraft meanwhile."""
+        until = self._truth()["time"] + seconds
+        self._lock_the_journal(3.0)
+        self._order("hold")
+        self.judge.stopped(self._now(), OPERATOR)
+        while self._truth()["time"] < until and self._service.process.poll() is None:
+            self._pass(0.3)
+            self._lock_the_journal(3.0)
+
     def _let_the_mock(self, fault: Fault) -> None:
         """A fault of the mock's, under its own name."""
-        name = {"pilot_sticks": "pilot", "dead_reckoning": "gps_lost"}.get(fault.kind, fault.kind)
+        name = OF_THE_MOCK.get(fault.kind, fault.kind)
         if name == "battery_unknown":  # low enough that it must not be forgotten
             self._control.fault("battery", percent=float(self._rng.uniform(24.0, 30.0)))
             self._pass(3.0)
@@ -363,8 +379,10 @@ class SoakFlight:
         self._kill()
         self._pass(seconds)
 
-    def _kill(self) -> None:
+    def _kill(self, *, by_its_unit: bool = False) -> None:
         """kill -9 and --resume: what was told before must still hold, and what was acknowledged be there.
+
+        `by_its_unit`: it is started again as it was with `--go-on`, without anybody's order.
 
         A run that has ended in the meantime is left so: what would come up is another flight, which nobody launches.
         """
@@ -376,10 +394,10 @@ class SoakFlight:
         if not self._alive_runs():
             raise Trouble("there is no run to go on with")
         self.judge.started_over()
-        if not self.judge.is_stopped:
+        if not (self.judge.is_stopped or by_its_unit):
             self.judge.ordered(self._now())  # --resume is an order to go on
         self._control.speedup(1.0)  # a computer that starts does so in its own time, and the battery is small
-        self._launch(["--resume", str(self._alive_runs()[0])])
+        self._launch([*self._words, "--go-on"] if by_its_unit else ["--resume", str(self._alive_runs()[0])])
         self._control.speedup(self.speedup)
 
     def _alive_runs(self) -> list[Path]:

@@ -53,6 +53,7 @@ _STREAMS = (
     "EXTENDED_SYS_STATE",
     "GLOBAL_POSITION_INT",
     "HOME_POSITION",
+    "RC_CHANNELS,MANUAL_CONTROL",
 )
 _LIES: tuple[
     tuple[str, str, float, int], ...
@@ -111,6 +112,18 @@ def _velocity(rng: Generator) -> Options:
     return {"north": float(rng.uniform(-2, 2)), "east": float(rng.uniform(-2, 2))}
 
 
+_CHARGE_STATES = (2, 3, 4)  # MAV_BATTERY_CHARGE_STATE: low, critical, an emergency
+
+
+def _charge(rng: Generator) -> Options:
+    field = {"message": "BATTERY_STATUS", "field": "charge_state"}
+    return {**field, "value": float(rng.choice(_CHARGE_STATES)), "times": 0}
+
+
+def _stranger(rng: Generator) -> Options:
+    return {"way": str(rng.choice(["maps", "decisions", "half-open connections", "wishes"]))}
+
+
 def _lying_detector(rng: Generator) -> Options:
     return {"way": str(rng.choice(["swapped", "nowhere", "far", "everywhere", "still", "pose"]))}
 
@@ -145,6 +158,7 @@ KINDS: dict[str, Kind] = {
     "battery_critical": Kind(
         0.5, (10, 20), lambda rng: {"action": str(rng.choice(["return", "land", "warn"]))}, last=True
     ),
+    "charge_state": Kind(0.5, (10, 20), _charge, last=True),
     "battery": Kind(0.5, (0, 0), lambda rng: {"percent": float(rng.uniform(10, 60))}),
     "reboot": Kind(0.5, (0, 0), last=True),
     # who is in charge
@@ -160,6 +174,7 @@ KINDS: dict[str, Kind] = {
     "detector_silent": Kind(2, (5, 40)),
     "detector_repeats": Kind(1, (5, 40)),
     "bad_requests": Kind(1, (2, 10)),
+    "strangers": Kind(1, (5, 30), _stranger),
     # the operator
     "operator_holds": Kind(1, (2, 20)),
     # news from the field
@@ -167,8 +182,9 @@ KINDS: dict[str, Kind] = {
     "exclude": Kind(1, (20, 60)),
     # our own process
     "stall": Kind(2, (0, 0), lambda rng: {"wall_s": float(rng.uniform(0.3, 5.0))}),
-    "killed": Kind(2, (0, 0)),
+    "killed": Kind(2, (0, 0), lambda rng: {"go_on": bool(rng.random() < 0.4)}),
     "journal_locked": Kind(1, (5, 40)),
+    "journal_slow": Kind(1, (10, 40), stops="the operator's hold"),
     "hangup": Kind(0.5, (1, 5)),
     # what the vehicle tells
     "one_way": Kind(1, (2, 20), lambda rng: {"carries": str(rng.choice(["down", "up"]))}),
@@ -214,6 +230,9 @@ KINDS: dict[str, Kind] = {
 }
 
 
+OF_THE_MOCK = {"pilot_sticks": "pilot", "dead_reckoning": "gps_lost", "charge_state": "field"}
+"""What the mock calls those of its kinds that have another name here."""
+
 AT_BOOT: dict[str, Options] = {
     "none": {},
     "mavlink1": {"kind": "mavlink1", "at": 0.0},
@@ -232,11 +251,12 @@ AT_BOOT: dict[str, Options] = {
     "one_way_from_the_start": {"kind": "one_way", "at": 0.0, "seconds": 20.0},
     "link_lost_in_the_climb": {"kind": "link_lost", "after_arming": 2.0, "seconds": 8.0},
     "gps_lost_in_the_climb": {"kind": "gps_lost", "after_arming": 3.0, "seconds": 6.0},
+    "pilot_before_the_launch": {"kind": "pilot", "at": 0.0, "seconds": 25.0},
     "pilot_in_the_climb": {"kind": "pilot", "after_arming": 3.0, "seconds": 4.0},
 }
 """What is so from the start, as the mock's file of faults has it."""
 
-WITH_A_HOLD = frozenset({"operator_holds", "killed_while_held", "killed_while_yielded"})
+WITH_A_HOLD = frozenset({"operator_holds", "journal_slow", "killed_while_held", "killed_while_yielded"})
 """Kinds that stop the aircraft themselves, or let its pilot do so, before anything goes wrong."""
 
 GROUNDS: dict[str, str] = {"no_landed_state": "does not tell whether it is in the air"}

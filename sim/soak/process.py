@@ -63,6 +63,12 @@ class Process:
         except subprocess.TimeoutExpired:
             raise AssertionError(f"still running after {patience_s} s:\n{self.said}") from None
 
+    def __enter__(self) -> Process:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
     def stop(self) -> None:
         """It is gone when this returns, whatever happens."""
         if self.process.poll() is None:

@@ -21,7 +21,7 @@ from sim.soak import ground
 from sim.soak.audit import Target, audit, wrongly_found
 from sim.soak.clocked import CLOCK_FILE, SteppedClock
 from sim.soak.eyes import Eyes, distort, grown, misplaced
-from sim.soak.kinds import AT_BOOT, KINDS
+from sim.soak.kinds import AT_BOOT, KINDS, OF_THE_MOCK
 from sim.soak.plan import draw_plan
 from tests.integration.flight import REPOSITORY
 
@@ -38,8 +38,8 @@ def test_a_short_soak_ends_without_a_violation() -> None:
 
 
 def test_a_seed_is_a_flight_and_every_kind_of_fault_comes() -> None:
-    plans = [draw_plan(seed, ground.BOUNDS, 12) for seed in range(100)]
-    again = [draw_plan(seed, ground.BOUNDS, 12) for seed in range(100)]
+    plans = [draw_plan(seed, ground.BOUNDS, 12) for seed in range(200)]
+    again = [draw_plan(seed, ground.BOUNDS, 12) for seed in range(200)]
     assert str(plans) == str(again)  # nan is not nan
     assert {fault.kind for plan in plans for fault in plan.faults} == set(KINDS)
     assert {plan.at_boot for plan in plans} == set(AT_BOOT)
@@ -56,11 +56,16 @@ def test_what_is_drawn_can_be_said() -> None:
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_every_draw_of_a_fault_of_the_mock_is_one_that_it_takes(kind: str) -> None:
-    name = {"pilot_sticks": "pilot", "dead_reckoning": "gps_lost"}.get(kind, kind)
+    name = OF_THE_MOCK.get(kind, kind)
     for seed in range(30):
         (fault,) = draw_plan(seed, ground.BOUNDS, 1, frozenset({kind})).faults
         if name in faults.KINDS:
             faults.Fault.of({"kind": name, **fault.options})
+
+
+def test_the_soak_draws_every_fault_that_the_mock_can_make() -> None:
+    from_the_start = {table["kind"] for name, table in AT_BOOT.items() if name != "none"}
+    assert set(faults.KINDS) <= {OF_THE_MOCK.get(kind, kind) for kind in KINDS} | from_the_start
 
 
 def test_what_is_so_from_the_start_is_what_the_mock_takes() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import time
 from typing import Any, get_args
 
 import httpx
@@ -17,8 +18,10 @@ from websockets.asyncio.client import connect
 from service.evidence.reports import OrderReceipt, OrderRequest
 from service.http.address import split_address
 from service.http.crowd import Crowd
+from service.http.events import EVERY_S
 from service.http.guard import STOPS
 from service.mission.orders import STOPPING
+from service.view.feed import Moment
 
 from .door import FRAME, HOLD, FakeRun, on_a_socket
 
@@ -105,6 +108,28 @@ def test_a_watcher_is_read_little_at_a_time(monkeypatch: pytest.MonkeyPatch) -> 
 
     asyncio.run(talk())
     assert max(sizes) <= 1024
+
+
+def test_a_watcher_gets_a_moment_each_quarter_second_at_most_however_often_it_wishes() -> None:
+    asked: list[float] = []
+
+    class Counted(FakeRun):
+        async def moment(self) -> Moment:
+            asked.append(time.monotonic())
+            return await super().moment()
+
+    async def talk() -> None:
+        async with (
+            on_a_socket(Counted()) as door,
+            connect(door.url.replace("http", "ws", 1) + "/api/events") as watcher,
+        ):
+            for number in range(1000):
+                await watcher.send(f'{{"at": {number}}}')
+            while len(asked) < 5:
+                await watcher.recv()
+
+    asyncio.run(talk())
+    assert asked[-1] - asked[0] > 0.9 * EVERY_S * (len(asked) - 1)
 
 
 def test_an_order_gets_through_four_hundred_half_open_connections() -> None:

@@ -70,7 +70,7 @@ def main() -> None:
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)
     if os.getppid() == parent:
-        with contextlib.suppress(EOFError, ConnectionError):
+        with contextlib.suppress(EOFError, OSError):
             _draw_for_ever(Connection(int(sys.argv[1])))
 
 

@@ -327,3 +327,14 @@ def test_maps_are_drawn_in_another_process_that_may_end(tmp_path: Path) -> None:
                 await asyncio.sleep(0.01)
 
     asyncio.run(talk())
+
+
+def test_who_draws_ends_without_a_word_when_the_one_who_asks_dies_in_the_middle_of_it() -> None:
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        words = [sys.executable, "-m", "service.border.drawer", str(theirs.fileno())]
+        drawer = subprocess.Popen(words, pass_fds=[theirs.fileno()], stderr=subprocess.PIPE, text=True)
+        theirs.close()
+        ours.sendall((100).to_bytes(4, "big") + b"the beginning of what was to be drawn")
+    _, said = drawer.communicate(timeout=PATIENCE_S)
+    assert (drawer.returncode, said) == (0, "")

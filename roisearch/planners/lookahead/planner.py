@@ -256,7 +256,7 @@ class LookaheadPlanner:
                 self.pose = pose
                 return
             self._belief, touched = belief, [differing]
-        steps = self._steps_flown(cell)
+        steps = self._steps_flown(pose)
         if steps > 0:
             before = tree.value[plans.EXPECTED]
             flown = plans.advance(steps, self.pose, tree, self.thinking.desk)
@@ -355,13 +355,24 @@ class LookaheadPlanner:
         self._tree.value[plans.UNDETECTED] = self._at_first
         self._tree.mark[:] = 0
 
-    def _steps_flown(self, cell: tuple[int, int]) -> int:
-        """How many steps of the plan were flown to get to `cell`; -1 when it is not on the plan."""
-        if (self.pose.row, self.pose.col) == cell:
+    def _steps_flown(self, pose: Pose) -> int:
+        """How many steps of the plan were flown to get to `pose`; -1 when its cell is not on the plan.
+
+        A plan may enter a cell more than once within a few steps, so the one that ends with its heading is meant.
+        """
+        if self.pose == pose:
             return 0
+        cols = self._chart.cols
         now, length = self._tree.mark[plans.NOW], self._tree.mark[plans.LENGTH]
         ahead = self._tree.path[now : min(length, now + 2 * self.settings.path)]
-        found = np.flatnonzero(ahead == cell[0] * self._chart.cols + cell[1])
+        found = np.flatnonzero(ahead == pose.row * cols + pose.col)
+        before = np.where(found > 0, ahead[found - 1], self.pose.row * cols + self.pose.col)
+        down, right = MOVES[pose.heading]
+        as_told = found[before == (pose.row - down) * cols + pose.col - right]
+        if as_told.size:
+            return int(as_told[0]) + 1
+        if (self.pose.row, self.pose.col) == (pose.row, pose.col):
+            return 0
         return int(found[0]) + 1 if found.size else -1
 
     def _seen(self, pose: Pose, steps: int) -> list[NDArray[np.int64]]:

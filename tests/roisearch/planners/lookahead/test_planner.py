@@ -11,6 +11,7 @@ from roisearch import Belief, FieldOfView, SearchState, make_planner
 from roisearch.fov import HEADINGS, MOVES
 from roisearch.planners.lookahead.planner import LookaheadPlanner
 from roisearch.planners.lookahead.settings import LookaheadSettings
+from roisearch.planners.lookahead.thinking import Kept
 from roisearch.watch import LOOKED
 from sim.ruler import Ruler, detection_curve
 from sim.scenario import paper_prior
@@ -312,3 +313,21 @@ def test_what_is_left_of_a_searched_map_is_not_thought_about() -> None:
     assert planner.plan(belief, state, rng).effort.iterations == 5
     belief.observe(np.argwhere(prior > 0.1), False, 0.99, 0.9)
     assert planner.plan(belief, state, rng).effort.iterations == 0
+
+
+def test_a_plan_that_comes_back_to_a_cell_within_a_few_steps_is_flown_on() -> None:
+    planner = LookaheadPlanner(LookaheadSettings(iterations=0, horizon=100), fov=FOVS["point"])
+    belief, rng = Belief(hill((30, 30), (15, 15), 4.0)), np.random.default_rng(1)
+    planner.plan(belief, SearchState((15, 15)), rng)
+    kept = planner.kept()
+    path = kept.path.copy()
+    for step, cell in enumerate([(15, 16), (15, 17), (15, 16), (16, 16), (17, 16)]):
+        path[step] = cell[0] * 30 + cell[1]
+    path[5:] = path[4] + 30 * (1 - np.arange(95) % 2)
+    planner.take_up(Kept(path, kept.action))
+    for flown, state in ((3, SearchState((15, 16), "west")), (1, SearchState((16, 16), "south"))):
+        belief.observe([divmod(int(cell), 30) for cell in path[:flown]], False, 0.9, 1.0)
+        planner.plan(belief, state, rng)
+        path = path[flown:]
+        left = planner.committed()
+        assert (left[: path.size] == np.stack(np.divmod(path, 30), axis=1)).all()

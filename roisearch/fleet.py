@@ -13,19 +13,18 @@ it was reported or not, and with a searcher that leaves all of its looks go.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from roisearch.allocation import Allocation
 from roisearch.belief import Belief
 from roisearch.decision import Decision, SearchState
 from roisearch.fov import FieldOfView
 from roisearch.planners.base import Planner, Progress
 from roisearch.planners.lookahead.others import OthersLooks
 from roisearch.planners.lookahead.settings import LookaheadSettings
-from roisearch.planners.lookahead.thinking import Kept
 from roisearch.registry import make_planner
 from roisearch.searcher import NO_LOOKS, Cooperative, Searcher, expecting
 
@@ -207,8 +206,9 @@ class Fleet:
         """Share the search out anew: plans in which each begins with another region, judged as one by what all expect.
 
         Plans that are improved in turn get no better when two of them would have to change at once. So this tries
-        `openings` drawn at random, improves the most promising in turn, and keeps the best, or the present plans. It
-        takes about as long as a hundred decisions, so it is for the start of a search, and when one joins or leaves.
+        `openings` drawn at random, and shares of the mass for each to begin with, improves the most promising in turn,
+        and keeps the best, or the present plans; see `roisearch.allocation`. It takes about as long as a hundred
+        decisions, so it is for the start of a search, and when one joins or leaves.
         Searchers that are not in `states`, or whose planner is not `Cooperative`, keep their plans.
 
         Raises: as `plan`.
@@ -216,7 +216,14 @@ class Fleet:
         crew = {name: self._known(name).planner for name in states}
         able = {name: planner for name, planner in crew.items() if isinstance(planner, Cooperative)}
         if len(able) > 1:
-            _Allocation(self, able, belief, states, rng, now_s).make(openings)
+
+            def plan(name: str) -> None:
+                self.plan(name, belief, states[name], rng, now_s=now_s)
+
+            def tell(name: str) -> None:
+                self._tell(name, able[name], now_s)
+
+            Allocation(able, self._searchers, tell, plan, belief, states, rng, now_s).make(openings)
 
     def _tell(self, name: str, planner: Cooperative, now_s: float) -> None:
         """Tell the planner of `name` what the others are going to look at."""
@@ -247,69 +254,3 @@ class Fleet:
             if to_come
             else NO_LOOKS
         )
-
-
-PROMISING, ROUNDS = 4, 4
-"""Openings that are improved, and how often each of the searchers plans for that."""
-
-
-@dataclass
-class _Allocation:
-    """Shares a search out; see `Fleet.allocate`."""
-
-    fleet: Fleet
-    crew: Mapping[str, Cooperative]
-    belief: Belief
-    states: Mapping[str, SearchState]
-    rng: np.random.Generator
-    now_s: float
-
-    def make(self, openings: int) -> None:
-        """Try so many openings, and leave all with the best plans."""
-        best, kept = self._improved(), self._kept()
-        regions = min(planner.regions for planner in self.crew.values())
-        drawn = []
-        for _ in range(openings if regions else 0):
-            chosen = [
-                (1 + int(self.rng.integers(regions)), float(10.0 ** -self.rng.uniform(0.3, 1.7)))
-                for _ in self.crew
-            ]
-            drawn.append((self._open(chosen), chosen))
-        for _, chosen in sorted(drawn)[:PROMISING]:
-            self._open(chosen)
-            expected = self._improved()
-            if expected < best:
-                best, kept = expected, self._kept()
-        for (name, planner), plan in zip(self.crew.items(), kept, strict=True):
-            self.fleet._tell(name, planner, self.now_s)
-            planner.take_up(plan)
-            self._commit(name, planner)
-
-    def _kept(self) -> list[Kept]:
-        return [planner.kept() for planner in self.crew.values()]
-
-    def _open(self, chosen: Sequence[tuple[int, float]]) -> float:
-        """Let each sweep a region down to a share of its worth first; what is then expected, in seconds."""
-        for name in self.crew:
-            self.fleet.forget(name)
-        for (name, planner), (region, share) in zip(self.crew.items(), chosen, strict=True):
-            self.fleet._tell(name, planner, self.now_s)
-            planner.open_with(region, share)
-            self._commit(name, planner)
-        return self._expected()
-
-    def _improved(self) -> float:
-        """What is expected after each has planned a few times, in seconds."""
-        for _ in range(ROUNDS):
-            for name in self.crew:
-                self.fleet.plan(name, self.belief, self.states[name], self.rng, now_s=self.now_s)
-        return self._expected()
-
-    def _expected(self) -> float:
-        """By the one that was told of all others' last plans."""
-        name, planner = list(self.crew.items())[-1]
-        return planner.expected() * self.fleet._searchers[name].step_s
-
-    def _commit(self, name: str, planner: Cooperative) -> None:
-        searcher = self.fleet._searchers[name]
-        searcher.commit(planner.committed(), self.states[name], self.belief.shape, self.now_s)

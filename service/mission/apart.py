@@ -139,9 +139,10 @@ def rooms(other: Other, spacing: Spacing) -> tuple[Room, ...]:
 
     One that is not steered by us may be anywhere it can reach while we look. One that is not heard may be as far as it
     gets, at the heights of its leg; it may come down where its leg was, and its autopilot may fly it home. When it must
-    have done so it is on the ground or hovers where its leg was, until no battery lasts that long.
+    have done so it is on the ground or hovers where its leg was, until no battery lasts that long. One that flies and
+    has never told its place may be anywhere.
     """
-    if not other.in_air or other.age_s > spacing.battery_s:
+    if not other.in_air or spacing.battery_s < other.age_s < math.inf:
         return ()
     path = _path(other)
     if other.age_s > spacing.fresh_s:
@@ -363,7 +364,9 @@ def _right(other: Other) -> int:
 def _said(metres: float, other: Other, spacing: Spacing) -> str:
     if other.age_s > spacing.fresh_s:
         heard = (
-            f"has not been heard for {other.age_s:.0f} s" if math.isfinite(other.age_s) else "was never heard"
+            f"has not been heard for {other.age_s:.0f} s"
+            if math.isfinite(other.age_s)
+            else "flies and has never told its place"
         )
         return f"may come near {called(other)}, which {heard}"
     return (

@@ -110,7 +110,7 @@ from service.mission.states import (
     State,
     next_state,
 )
-from service.mission.traffic import Course
+from service.mission.traffic import Course, aloft
 from service.mission.untold import Untold
 from service.mission.watch import VehicleWatch
 from service.reasons import Reason
@@ -265,17 +265,20 @@ class MissionCore:
         return self._untold.battery
 
     def told(self, seen: Situation, now: float) -> Other:
-        """This aircraft as the other aircraft of the search are to see it: in the air from when it is about to be."""
-        if not math.isfinite(seen.telemetry.heartbeat_time) and may_be_aloft(self._flown_as, self.flight):
+        """This aircraft as the other aircraft of the search are to see it: in the air from when it is about to be, and
+        as an earlier process left it there until it says where it is, or that its motors stand still."""
+        t = seen.telemetry
+        placed, stands = math.isfinite(t.position_time), math.isfinite(t.heartbeat_time) and not aloft(t)
+        if not placed and not stands and may_be_aloft(self._flown_as, self.flight):
             climbs = self._flown_as.state == State.TAKEOFF
-            return self.helm.traffic.unheard(seen.telemetry, now, self.flight, climbs=climbs)
-        standing, heard = self.standing, now - seen.telemetry.heartbeat_time < self.terms.heartbeat_fresh_s
+            return self.helm.traffic.unheard(t, now, self.flight, climbs=climbs)
+        standing, heard = self.standing, now - t.heartbeat_time < self.terms.heartbeat_fresh_s
         course = Course(
             standing.state == State.TAKEOFF,
             standing.goes_home_by_itself,
             heard,
         )
-        return self.helm.traffic.told(seen.telemetry, now, course)
+        return self.helm.traffic.told(t, now, course)
 
     def ahead(self, seen: Situation) -> list[LatLon]:
         """Where the aircraft goes from here as decided: its waypoint and the path beyond; empty when it does not."""

@@ -57,6 +57,11 @@ class _Goal:
     until: float = math.inf
 
 
+def aloft(t: Telemetry) -> bool:
+    """Whether its autopilot says that it flies, or may at any moment."""
+    return t.armed or t.landed_state in ("in_air", "takeoff", "landing")
+
+
 def brakes_at(start: LatLon, stands: LatLon, goals: Sequence[LatLon]) -> LatLon:
     """Where it comes to a stand if `stands` is where it does when told to now: not beyond the farthest point that it
     flies straight to, for which it brakes by itself."""
@@ -121,21 +126,22 @@ class Traffic:
     def told(self, t: Telemetry, now: float, course: Course) -> Other:
         """This aircraft as the others see it."""
         guided = t.guided or course.climbs
-        aloft = t.armed or t.landed_state in ("in_air", "takeoff", "landing")
         own = self._own(t, now)
         astray = (
             not own.goals and t.ground_speed_mps > _FLIES_MPS
         )  # where to, nobody has told (us, since we started)
         return replace(
             self._lands(own, t) if course.returns else own,
-            in_air=aloft or self._rises_to_m is not None or t.heartbeat_time < self._rose_at,
+            in_air=(aloft(t) and now - t.heartbeat_time <= self._spacing.battery_s)
+            or self._rises_to_m is not None
+            or t.heartbeat_time < self._rose_at,
             steered=t.in_control and guided and course.heard and not astray,
         )
 
     def unheard(self, t: Telemetry, now: float, flight: Flight, *, climbs: bool) -> Other:
-        """This aircraft as the others are to see it when an earlier process left it in the air, and it has not been
-        heard since: where its journalled track ends, and on its way to where it was sent last. `climbs`: it was taking
-        off, as long as that process lived."""
+        """This aircraft as the others are to see it when an earlier process left it in the air, and it has not told
+        its place since: where its journalled track ends, and on its way to where it was sent last. `climbs`: it was
+        taking off, as long as that process lived."""
         at, lat, lon, up = flight.track[-1] if flight.track else (flight.told_at, *self._chart.home(t), 0.0)
         home_m, goals = self._heights.home_m, [] if flight.goal is None else [(flight.goal, up)]
         if climbs:
@@ -152,6 +158,7 @@ class Traffic:
             tuple(home_m + height for _, height in goals),
             age_s=now - at,
             steered=False,
+            system_id=t.system_id,
         )
 
     def _own(self, t: Telemetry, now: float) -> Other:

@@ -486,6 +486,36 @@ def test_until_it_is_heard_it_may_fly_to_where_it_was_sent_last() -> None:
     assert (heard.place, heard.goals) == (HERE, ())
 
 
+def test_a_heartbeat_alone_ends_no_room_until_the_place_is_told_too() -> None:
+    talk = left_behind(State.SEARCHING)
+    talk.shows(heartbeat_time=START, armed=True, landed_state="in_air", system_id=2)
+    told = talk.core.told(talk.seen, talk.now)
+    assert (told.in_air, told.steered, told.place, told.goals, told.system_id) == (
+        True,
+        False,
+        LAST,
+        (FAR,),
+        2,
+    )
+    below = other(HOME, up=0.0, name="3")
+    assert objection(below, below.sent(HOME, 15.0), (told,), SPACING)
+    talk.core.leave("it was not connected in time", talk.seen, talk.now)
+    assert talk.core.told(talk.seen, talk.now) == told
+    talk.shows(armed=False, landed_state="on_ground")
+    assert not talk.core.told(talk.seen, talk.now).in_air
+
+
+def test_one_that_flies_and_has_never_told_its_place_may_be_anywhere() -> None:
+    talk = Talk()
+    talk.sees(telemetry=Telemetry(heartbeat_time=START, armed=True, landed_state="in_air"))
+    told = talk.core.told(talk.seen, talk.now)
+    far = other(FAR, up=90.0, name="3")
+    said = objection(far, far.sent(HERE, 90.0), (told,), SPACING)
+    assert said == "may come near aircraft , which flies and has never told its place"
+    silent_for_long = talk.core.told(talk.seen, talk.now + SPACING.battery_s + 1.0)
+    assert not objection(far, far.sent(HERE, 90.0), (silent_for_long,), SPACING)
+
+
 @pytest.mark.parametrize(
     ("left", "earlier_s"), [(State.GROUNDED, 90.0), (State.WAITING, 0.0), (State.HOLDING, 90.0)]
 )

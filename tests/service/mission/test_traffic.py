@@ -14,7 +14,7 @@ from service.mission.apart import SETTLES_S, Claim, Other, Room, Spacing, home_b
 from service.mission.core import MissionCore
 from service.mission.effects import Arm, EnterGuided, Note, ReturnToLaunch, SendWaypoint, Stop
 from service.mission.flight import Flight
-from service.mission.news import NotSent, Order
+from service.mission.news import NotSent, Order, Unwritten
 from service.mission.standing import Standing, Terms
 from service.mission.states import State
 from sim.soak import ground
@@ -438,6 +438,43 @@ def test_who_lands_where_another_one_lands_is_told_before_the_take_off(
     assert isinstance(talk.doing(), EnterGuided)
     assert notes(talk, "may come down on who stands there") == said
     assert ("from that of aircraft 1" in talk.core.standing.why) == bool(said)
+
+
+LOST = "the journal cannot be written: the disk is full"
+
+
+@pytest.mark.parametrize(
+    "state", [State.TAKEOFF, State.SEARCHING, State.CONFIRMING, State.FOUND, State.HOLDING, State.RETURNING]
+)
+def test_without_a_journal_the_way_home_among_others_is_our_own(state: State) -> None:
+    talk = named(reached(state))
+    talk.shows(landed_state="in_air", armed=True, in_control=True, alt_home_m=15.0, alt_amsl_m=415.0)
+    talk.flew(FAR)
+    talk.sees(others=(other(HERE),))
+    talk.on(Unwritten(LOST))
+    assert talk.state == State.RETURNING
+    assert talk.core.standing.comes_home
+    assert LOST in (talk.core.standing.why_stopped, talk.core.standing.why) or state == State.RETURNING
+    talk.pass_by(2.0)
+    assert isinstance(talk.doing(), SendWaypoint)
+    assert not any(isinstance(effect, ReturnToLaunch) for effect in talk.wanted)
+
+
+def test_without_a_journal_one_that_holds_blind_goes_home_once_it_sees_and_what_is_not_ours_does_not() -> (
+    None
+):
+    talk = named(searching())
+    talk.silent.add("position")
+    talk.pass_by(4.0)
+    assert talk.core.standing.causes == {"position"}
+    talk.on(Unwritten(LOST))
+    assert (talk.state, talk.core.standing.comes_home) == (State.HOLDING, True)
+    talk.silent.clear()
+    talk.pass_by(20.0)
+    assert talk.state == State.RETURNING
+    yielded = named(reached(State.YIELDED))
+    yielded.on(Unwritten(LOST))
+    assert (yielded.state, yielded.core.standing.comes_home) == (State.YIELDED, False)
 
 
 SPACING = Spacing.of(Talk().settings.flight, 2.0)

@@ -23,12 +23,11 @@ from dataclasses import dataclass, replace
 import shapely
 
 from service.config import FlightSettings
+from service.config import gap_m as layer_gap_m
 from service.geometry import LatLon, moved, offset_m
 
 SLACK_M = 5.0
 """More than the separation is asked of a leg that is sent: positions are not exact, and paths not straight."""
-KEPT = 0.7
-"""The part of `flight.layer_m` that is left when both aircraft waver about their height."""
 STILL_M = 1.0  # whose stopping distance is shorter hovers
 ERODES_M = 0.5  # a leg that comes no nearer than it is now may come so much nearer
 LOOK_S = 5.0  # who is not steered by us may do anything for as long as it takes to see what it does
@@ -61,7 +60,7 @@ class Spacing:
         """As the settings say."""
         return cls(
             flight.separation_m,
-            KEPT * flight.layer_m,
+            layer_gap_m(flight),
             flight.climb_mps,
             flight.descent_mps,
             max(flight.full_battery_s, flight.max_flight_s),

@@ -32,6 +32,7 @@ STILL_M = 1.0  # whose stopping distance is shorter hovers
 ERODES_M = 0.5  # a leg that comes no nearer than it is now may come so much nearer
 LOOK_S = 5.0  # who is not steered by us may do anything for as long as it takes to see what it does
 FAILSAFE_S = 30.0  # after which an autopilot that hears nobody has begun its own way home
+SAME_M, LATE_S = 3.0, 1.0  # one place is told over two links, one of them later, with no more between
 SETTLES_S = 20.0  # from the ground under it to motors that stand still, and the last metres are flown slowly
 _SLOWER = 2.0  # than reckoned, at the most, is that way
 
@@ -107,6 +108,7 @@ class Other:
         returns: its autopilot flies home and lands.
         claim: what it waits for.
         system_id: its MAVLink system id; None: not heard yet.
+        ended: its mission has.
     """
 
     name: str
@@ -124,10 +126,20 @@ class Other:
     returns: bool = False
     claim: Claim | None = None
     system_id: int | None = None
+    ended: bool = False
 
     def sent(self, point: LatLon, up_m: float) -> Other:
         """The same aircraft, once it is sent to a point as well."""
         return replace(self, goals=(*self.goals, point), goals_up_m=(*self.goals_up_m, up_m))
+
+
+def same(own: Other, other: Other) -> bool:
+    """Whether another one is this aircraft, heard over a second link whose mission has ended for that: it has the same
+    MAVLink system id, and is where this one is, or was when that was told."""
+    if not other.ended or not own.system_id or other.system_id != own.system_id:
+        return False
+    flew_m = own.speed_mps * (abs(other.age_s - own.age_s) + LATE_S)
+    return math.hypot(*offset_m(own.place, other.place)) <= SAME_M + flew_m
 
 
 # ---- rooms

@@ -282,6 +282,7 @@ class MissionCore:
             standing.state == State.TAKEOFF,
             standing.goes_home_by_itself,
             heard,
+            standing.state in FINAL,
         )
         return self.helm.traffic.told(t, now, course)
 

@@ -41,11 +41,12 @@ _CONE = 3.0  # an autopilot's own way home is at most so many times as high as i
 @dataclass(frozen=True, slots=True)
 class Course:
     """What is to be known of a mission beside its telemetry: whether it takes off (`climbs`), the autopilot flies home
-    (`returns`), and a heartbeat has come lately (`heard`)."""
+    (`returns`), a heartbeat has come lately (`heard`), and it has `ended`."""
 
     climbs: bool
     returns: bool
     heard: bool
+    ended: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +137,7 @@ class Traffic:
             or self._rises_to_m is not None
             or t.heartbeat_time < self._rose_at,
             steered=t.in_control and guided and course.heard and not astray,
+            ended=course.ended,
         )
 
     def unheard(self, t: Telemetry, now: float, flight: Flight, *, climbs: bool) -> Other:

@@ -109,6 +109,7 @@ class Other:
         claim: what it waits for.
         system_id: its MAVLink system id; None: not heard yet.
         ended: its mission has.
+        home_amsl_m: how high home is above the sea, by its autopilot; NaN: not told.
     """
 
     name: str
@@ -127,6 +128,7 @@ class Other:
     claim: Claim | None = None
     system_id: int | None = None
     ended: bool = False
+    home_amsl_m: float = math.nan
 
     def sent(self, point: LatLon, up_m: float) -> Other:
         """The same aircraft, once it is sent to a point as well."""

@@ -187,6 +187,7 @@ class Traffic:
             age_s=now - t.position_time,
             claim=self._claim if now - self._claimed_at <= CLAIM_S else None,
             system_id=t.system_id,
+            home_amsl_m=t.home_alt_amsl_m,
         )
 
     def _may_fly_to(self, t: Telemetry, now: float) -> list[_Goal]:
@@ -280,6 +281,23 @@ class Traffic:
                 return (
                     f"its autopilot has the MAVLink system id {t.system_id}, as that of {called(other)}: it may be the "
                     "same aircraft over two links; give each its own id (MAV_SYS_ID, SYSID_THISMAV)"
+                )
+        return ""
+
+    def uneven(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """Why its height above home is not comparable with that of another one above its own, or nothing: without a
+        ground file nothing else says how high they are. Who flies has its height, else the first by name."""
+        if self._heights.relief is not None:
+            return ""
+        most_m = self._flight.layer_m - self._spacing.gap_m
+        for other in others:
+            before = other.in_air or (not other.ended and other.name < self.name)
+            higher_m = t.home_alt_amsl_m - other.home_amsl_m
+            if before and abs(higher_m) > most_m:
+                return (
+                    f"home is {abs(higher_m):.0f} m {'higher' if higher_m > 0.0 else 'lower'} than that of "
+                    f"{called(other)}, more than the {most_m:g} m that the layers allow for: give the heights of the "
+                    "ground (--ground), or let both begin equally high"
                 )
         return ""
 

@@ -477,6 +477,32 @@ def test_without_a_journal_one_that_holds_blind_goes_home_once_it_sees_and_what_
     assert (yielded.state, yielded.core.standing.comes_home) == (State.YIELDED, False)
 
 
+@pytest.mark.parametrize(
+    ("another", "refused"),
+    [
+        ({"home_amsl_m": 410.0}, True),
+        ({"home_amsl_m": 402.5}, False),
+        ({}, False),
+        ({"home_amsl_m": 410.0, "name": "9", "in_air": False}, False),  # whose take-off is refused then
+        ({"home_amsl_m": 410.0, "name": "9"}, True),
+        ({"home_amsl_m": 410.0, "ended": True, "in_air": False}, False),
+    ],
+)
+def test_without_a_ground_file_who_would_fly_at_anothers_height_does_not_take_off(
+    another: dict[str, Any], refused: bool
+) -> None:
+    talk = on_the_ground()
+    talk.sees(others=(other(FAR, **another),))
+    talk.done()
+    talk.pass_by(2.0)
+    assert (talk.state == State.ABORTED) == refused
+    if refused:
+        assert talk.core.standing.why.startswith("home is 10 m lower than that of aircraft ")
+        assert "more than the 3 m that the layers allow for" in talk.core.standing.why
+    else:
+        assert isinstance(talk.doing(), EnterGuided)
+
+
 SPACING = Spacing.of(Talk().settings.flight, 2.0)
 LAST = place(180.0, 120.0)
 

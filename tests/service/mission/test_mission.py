@@ -15,6 +15,7 @@ import pytest
 
 from service.journal import read_rows
 from service.mission.apart import Other
+from service.mission.formation import Formation
 from service.mission.states import State
 from tests.service.mission.aloft import aloft, until
 from tests.service.mission.flown import HERE
@@ -73,11 +74,12 @@ def test_among_others_a_lost_journal_leads_home_past_them_and_one_at_a_time(tmp_
     """By itself its autopilot would climb to its own height at once, as would those of all the others."""
 
     async def fly() -> None:
-        async with aloft(tmp_path) as mission:
+        formation = Formation()
+        async with aloft(tmp_path, formation=formation) as mission:
             t = mission.vehicle.telemetry
             home, up = mission.core.chart.home(t), t.alt_home_m
             beside = Other("2", home, up, home, home, 60.0, 8.0)
-            mission._outlook.formation.join("2", lambda: beside)
+            formation.join("2", lambda: beside)
             mission.journal.path.unlink()
             await until(mission, lambda: mission.state == State.RETURNING)
             assert "has been deleted" in mission.standing.why_stopped

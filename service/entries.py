@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
+from service.config import ONLY
 from service.errors import BadInput
 from service.journal import Row, read_last, read_rows
 from service.rowbody import Body
@@ -64,6 +65,12 @@ class AircraftRow:
 def of_aircraft(said: KnownRow, aircraft: str) -> KnownRow | AircraftRow:
     """A row with the name of its aircraft; as it is where there is only one, which has no name."""
     return AircraftRow(said, aircraft) if aircraft else said
+
+
+def of_whom(aircraft: str, first: str) -> str:
+    """The name of the aircraft that rows with this name are of, where the first one is called `first`: rows of a time
+    when that flew alone have none, and where that is how it flies now, it was the first by number beside others."""
+    return first if not aircraft or (not first and aircraft == ONLY) else aircraft
 
 
 @contextlib.contextmanager

@@ -179,7 +179,10 @@ class Journal:
         self._queue.put(entries)
 
     def behind_s(self) -> float:
-        """How long the oldest row has been waiting to be on disk, in seconds of wall time: a slow or locked disk."""
+        """How long the oldest row has waited to be on disk, in seconds of wall time: a slow or locked disk. Nobody
+        waits for one that has failed."""
+        if self.failed is not None:
+            return 0.0
         try:
             return time.monotonic() - self._waiting[0]
         except IndexError:

@@ -99,7 +99,7 @@ def note_beginning(journal: Journal, folder: Path, settings: Settings) -> None:
 
 
 def note_resumption(journal: Journal, folder: Path, settings: Settings) -> None:
-    """Keep in a journal that another process goes on with it, and say what it flies otherwise.
+    """Keep in a journal that another process goes on with it, and by which aircraft, and say what it flies otherwise.
 
     Raises BadInput when it cannot go on with what is here.
     """
@@ -109,6 +109,10 @@ def note_resumption(journal: Journal, folder: Path, settings: Settings) -> None:
     if begun_by != ours:
         log.info("this run was begun by roisearch %s and goes on with %s", begun_by, ours)
     changed = changes(stored_settings(journal.path, {}), settings)
+    if "aircraft" in changed:  # or the next one to go on with it forgets who may be in the air
+        stored = journal.meta("settings")
+        link = {**stored.get("link", {}), "connect": settings.link.connect}
+        journal.set_meta("settings", {**stored, "link": link, "aircraft": settings.model_dump()["aircraft"]})
     told = {key: "(not told)" if value and key in _SECRETS else value for key, value in changed.items()}
     tell_changes(told)
     now = clock_for(

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from service.area import Grid, SearchArea
-from service.config import Settings, changed_settings, without_unknown
+from service.config import ONLY, Settings, changed_settings, without_unknown
 from service.drawing import RegionsRow
-from service.entries import Entry, read_entries, understanding
+from service.entries import Entry, of_whom, read_entries, understanding
 from service.errors import BadInput
 from service.evidence.intake import Intake
 from service.evidence.moments import HISTORY_S
@@ -120,7 +120,8 @@ class Remembered:
 
 @dataclass(frozen=True)
 class Whose:
-    """Whose rows are meant: those of `aircraft`, and where it is the `first`, those of a time when it was the only one.
+    """Whose rows are meant: those of `aircraft`, and where it is the `first`, those of a time when it was the only one,
+    or, where it is that now, the first.
 
     With the default, those of the only one, which are all that name none.
     """
@@ -129,7 +130,11 @@ class Whose:
     first: bool = True
 
     def __contains__(self, entry: Entry) -> bool:
-        return entry.aircraft == self.aircraft or (self.first and not entry.aircraft)
+        return self.owns(entry.aircraft)
+
+    def owns(self, name: str) -> bool:
+        """Whether rows with this name are meant."""
+        return (of_whom(name, self.aircraft) if self.first else name) == self.aircraft
 
 
 ALONE = Whose()
@@ -173,8 +178,7 @@ def replay(
 
 def remembered_of(all_: dict[str, Remembered], journal: Path, whose: Whose = ALONE) -> Remembered:
     """What the intake of one aircraft has to know of them."""
-    names = {whose.aircraft, ""} if whose.first else {whose.aircraft}
-    own = [all_[name] for name in sorted(names & set(all_))]
+    own = [all_[name] for name in sorted(all_) if whose.owns(name)]
     recent = sorted((entry for each in own for entry in each.recent), key=lambda entry: entry.seq)
     return Remembered(journal, tuple(name for each in own for name in each.ids), tuple(recent))
 
@@ -369,6 +373,9 @@ def runs_in_order(parent: Path) -> list[tuple[Path, int]]:
 
 
 def _transitions(journal: Path) -> Iterator[tuple[Entry, TransitionRow]]:
+    """Those of all aircraft, each by one name, whether it flew alone then or not."""
+    tables = (read_meta_if_any(journal, "settings") or {}).get("aircraft") or []
+    first = tables[0].get("name") or ONLY if tables else ""
     for entry in read_entries(journal, TransitionRow):
         if isinstance(entry.said, TransitionRow):
-            yield entry, entry.said
+            yield replace(entry, aircraft=of_whom(entry.aircraft, first)), entry.said

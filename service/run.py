@@ -32,7 +32,8 @@ from service.ground.words import of_the_ground
 from service.http import Door, open_door
 from service.journal import Journal
 from service.lockstep import Lockstep
-from service.mavlink import LinkError, MavlinkSettings, Vehicle, check_link, read_signing_key
+from service.mavlink import LinkError, MavlinkSettings, Vehicle, check_links, read_signing_key
+from service.mavlink.url import LinkUrl, parse_url
 from service.mission.states import FINAL, State
 from service.outlet import whatever_the_terminal_does
 from service.progress import set_up_logging, show
@@ -61,7 +62,8 @@ class Prepared:
     """All that has to be right before anything starts: the ground, the sensor, the addresses, the key.
 
     `restarted`: it may be that no person started this, so that only an order takes off. `patient`: nor that there is
-    one to start it again, and an aircraft may be in the air, so that its link is waited for.
+    one to start it again, and an aircraft may be in the air, so that its link is waited for. `shut`: the aircraft whose
+    links cannot be opened yet, while others go on.
     """
 
     area: SearchArea
@@ -75,11 +77,12 @@ class Prepared:
     signing_key: bytes | None
     console: Console
     telling: TellingPlan = NOBODY
+    shut: frozenset[str] = frozenset()
 
 
 def run(area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool = False) -> int:
     """Run a search from its area file to the ground; returns the exit code. Raises BadInput before it starts."""
-    with _prepared(area_file, prior_file, settings, restarted=restarted, patient=False) as prepared:
+    with _prepared(area_file, prior_file, settings, restarted=restarted, resumed=False) as prepared:
         folder = _new_folder(Path(settings.run.folder), prepared.area.name)
         keep_area(area_file, folder, settings)
         if prior_file is not None:
@@ -109,7 +112,7 @@ def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) ->
     prior_file = folder / PRIOR
     prior = prior_file if prior_file.exists() else None
     with (
-        _prepared(folder / AREA, prior, settings, restarted=restarted, patient=restarted) as prepared,
+        _prepared(folder / AREA, prior, settings, restarted=restarted, resumed=True) as prepared,
         contextlib.closing(Journal(folder / JOURNAL)) as journal,
     ):
         if journal.meta("grid") != prepared.grid.frame.to_dict():
@@ -122,32 +125,51 @@ def resume(folder: Path, changed: dict[str, Any], *, restarted: bool = False) ->
 
 @contextlib.contextmanager
 def _prepared(
-    area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool, patient: bool
+    area_file: Path, prior_file: Path | None, settings: Settings, *, restarted: bool, resumed: bool
 ) -> Iterator[Prepared]:
     """Read everything and take every address before anything starts, and give these up at the end; raises BadInput."""
     console = Console()
     set_up_logging(console)
     area, grid = survey(area_file, prior_file, settings)
     _tell(area, grid, settings)
+    shut = frozenset[str]()
     if not settings.mock:
-        links: dict[str, str] = {}
-        for name, alone in each_aircraft(settings).items():
-            with about(name):
-                link = str(check_link(alone.link.connect, patient=patient))
-            if links.setdefault(link, name) != name:
-                raise BadInput(
-                    f"aircraft '{links[link]}' and '{name}' both have the link {link}; each needs its own"
-                )
-            _check_ground(alone)
+        shut = check_links(_links(settings), resumed=resumed, patient=resumed and restarted)
     sensors, signing_key = sensors_over(grid, settings), _signing_key(settings)
     telling = read_plan(settings.telling)
     with (
         contextlib.closing(open_door(settings.http, os.environ, settings.page)) as door,
         contextlib.closing(open_doors(settings.doors)) as doors,
     ):
+        patient = resumed and restarted
         yield Prepared(
-            area, grid, sensors, settings, restarted, patient, door, doors, signing_key, console, telling
+            area,
+            grid,
+            sensors,
+            settings,
+            restarted,
+            patient,
+            door,
+            doors,
+            signing_key,
+            console,
+            telling,
+            shut,
         )
+
+
+def _links(settings: Settings) -> dict[str, LinkUrl]:
+    """The address of each aircraft by its name. Raises BadInput when one is none, or two are the same."""
+    links: dict[LinkUrl, str] = {}
+    for name, alone in each_aircraft(settings).items():
+        with about(name):
+            link = parse_url(alone.link.connect)
+        if links.setdefault(link, name) != name:
+            raise BadInput(
+                f"aircraft '{links[link]}' and '{name}' both have the link {link}; each needs its own"
+            )
+        _check_ground(alone)
+    return {name: link for link, name in links.items()}
 
 
 def _ready(prepared: Prepared) -> list[Search]:
@@ -333,7 +355,7 @@ class Service:
             allow_arming=self.settings.mock or self.settings.flight.takeoff,
             link_lost_s=link.silent_after_s,
             arming_patience_s=link.connect_timeout_s,
-            wait_for_ever=self.prepared.patient,
+            wait_for_ever=self.prepared.patient or search.aircraft in self.prepared.shut,
             read_return_height=self.search.grid.relief is not None,
             read_motion=True,
             signing_key=self.prepared.signing_key,

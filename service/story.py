@@ -12,8 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from service.area.frame import GridFrame
-from service.config import ONLY
-from service.entries import Entry
+from service.entries import Entry, of_whom
 from service.evidence.found import Found
 from service.evidence.observe import FramePose
 from service.geometry import Cell, LatLon
@@ -206,8 +205,7 @@ class StoriesSoFar:
             for name in self.flights:
                 self._go_on(name, entry, frame)
             return
-        alone = self._first == "" and entry.aircraft == ONLY  # it flew alone first, and has that name since
-        self._go_on(self._first if alone else entry.aircraft or self._first, entry, frame)
+        self._go_on(of_whom(entry.aircraft, self._first), entry, frame)
 
     def _go_on(self, name: str, entry: Entry, frame: GridFrame) -> None:
         """By a row that is a part of this story."""

@@ -66,8 +66,8 @@ class Separation:
         self.together += len(flying) > 1
         for first, second in combinations(flying, 2):
             self._pair(first, second, (flying[first], again[first]), flying[second])
-        for pair in [pair for pair in self._near if not set(pair) <= flying.keys()]:
-            del self._near[pair]
+        for pair in [pair for pair in {*self._near, *self._since} if not set(pair) <= flying.keys()]:
+            self._over(pair)
 
     def _pair(
         self,
@@ -79,7 +79,7 @@ class Separation:
         a = max(around, key=lambda each: _apart_m(each, b))
         gap, metres = max(abs(each["up"] - b["up"]) for each in around), _apart_m(a, b)
         if gap >= self._gap_m or metres >= 2.0 * self._separation_m:
-            self._near.pop((first, second), None)
+            self._over((first, second))
             self._given_back.pop((first, second), None)
             return
         self.nearest_m = min(self.nearest_m, metres)
@@ -100,6 +100,11 @@ class Separation:
         if (first, second) not in self._near:
             self._near[first, second] = len(self.violations)
             self.violations.append(said)
+
+    def _over(self, pair: tuple[str, str]) -> None:
+        """An encounter is: the next one is another, with a grace of its own."""
+        self._near.pop(pair, None)
+        self._since.pop(pair, None)
 
     def _stands(self, pair: tuple[str, str], a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
         """Of two, one of whom may be flown by somebody else, the other stands, or came too near only just now."""

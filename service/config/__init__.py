@@ -3,7 +3,7 @@
 Every key with its unit, default and meaning stands in `config/service.toml`; a test keeps the two alike.
 """
 
-from service.config.aircraft import ONLY, about, each_aircraft, name_of
+from service.config.aircraft import ONLY, about, each_aircraft, gap_m, name_of
 from service.config.keys import KNOWN_KEYS, checked, nearest_key, without_unknown
 from service.config.reading import changed_settings, file_problems, read_settings, read_toml, variable_name
 from service.config.tables import (
@@ -39,6 +39,7 @@ __all__ = [
     "checked",
     "each_aircraft",
     "file_problems",
+    "gap_m",
     "name_of",
     "nearest_key",
     "read_settings",

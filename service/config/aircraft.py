@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
-from service.config.tables import AircraftSettings, Settings
+from service.config.tables import AircraftSettings, FlightSettings, Settings
 from service.errors import BadInput
 
+_KEPT = 0.7  # the part of a layer that is left when both aircraft waver about their height
 ONLY = "1"
 """What the only aircraft of a run is called where names are told."""
 
@@ -22,8 +24,8 @@ def each_aircraft(settings: Settings) -> dict[str, Settings]:
     if not settings.aircraft:
         return {"": settings}
     return {
-        name_of(table, number): _alone(settings, table, number)
-        for number, table in enumerate(settings.aircraft)
+        name_of(table, number): _alone(settings, table, offset_m)
+        for number, (table, offset_m) in enumerate(zip(settings.aircraft, _offsets_m(settings), strict=True))
     }
 
 
@@ -41,11 +43,24 @@ def name_of(table: AircraftSettings, number: int) -> str:
     return table.name or str(number + 1)
 
 
-def _alone(settings: Settings, table: AircraftSettings, number: int) -> Settings:
+def gap_m(flight: FlightSettings) -> float:
+    """How far apart in height two layers have to be, so that who is in one need not look at who is in the other."""
+    return _KEPT * flight.layer_m
+
+
+def _offsets_m(settings: Settings) -> list[float]:
+    """How much higher than `flight.altitude_m` each flies."""
+    offsets_m: list[float] = []
+    for table in settings.aircraft:
+        above_m = offsets_m[-1] + settings.flight.layer_m if offsets_m else 0.0
+        offsets_m.append(above_m if table.altitude_offset_m is None else table.altitude_offset_m)
+    return offsets_m
+
+
+def _alone(settings: Settings, table: AircraftSettings, offset_m: float) -> Settings:
     """The settings of one of several, as if it flew alone."""
     link, flight, demo = settings.link, settings.flight, settings.demo
-    offset = number * flight.layer_m if table.altitude_offset_m is None else table.altitude_offset_m
-    height = {"altitude_m": flight.altitude_m + offset, "clearance_m": flight.clearance_m + offset}
+    height = {"altitude_m": flight.altitude_m + offset_m, "clearance_m": flight.clearance_m + offset_m}
     height |= {"speed_mps": table.speed_mps or flight.speed_mps}
     own = {"connect": table.connect, "system_id": table.system_id or link.system_id}
     return settings.model_copy(
@@ -76,6 +91,13 @@ def check_apart(settings: Settings, where: str) -> None:
     tables = {name_of(table, number): table for number, table in enumerate(settings.aircraft)}
     if len(tables) < len(settings.aircraft):
         raise BadInput(f"{where}: two aircraft have the same name; give each its own, or none")
+    layers_m = sorted(zip(_offsets_m(settings), tables, strict=True))
+    for (low_m, low), (high_m, high) in pairwise(layers_m):
+        if high_m - low_m < gap_m(settings.flight):
+            raise BadInput(
+                f"{where}: aircraft '{low}' and '{high}' fly {high_m - low_m:g} m apart in height, which is less than "
+                f"the {gap_m(settings.flight):g} m that two layers need; change an altitude_offset_m, or leave it out"
+            )
     linked = {name for name, table in tables.items() if table.connect}
     if linked and len(linked) < len(tables):
         without = next(name for name in tables if name not in linked)

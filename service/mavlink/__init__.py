@@ -5,7 +5,7 @@ and without a clock of its own), `transports` (the wires), and `autopilots` (wha
 ArduPilot).
 """
 
-from service.mavlink.checking import check_link
+from service.mavlink.checking import check_links
 from service.mavlink.errors import CommandFailed, LinkError, NotAnswered, NotPermitted, NoVehicle
 from service.mavlink.events import Home
 from service.mavlink.history import PastPose, PoseHistory
@@ -29,6 +29,6 @@ __all__ = [
     "Telemetry",
     "Vehicle",
     "Wind",
-    "check_link",
+    "check_links",
     "read_signing_key",
 ]

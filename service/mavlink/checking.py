@@ -1,4 +1,4 @@
-"""Whether a link can be opened, asked before anything is prepared for it."""
+"""Whether links can be opened, asked before anything is prepared for it."""
 
 from __future__ import annotations
 
@@ -7,39 +7,58 @@ import itertools
 import logging
 import os
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from service.errors import BadInput
 from service.mavlink.errors import LinkError
 from service.mavlink.transports import Transport, make_transport, pyserial
-from service.mavlink.url import LinkKind, LinkUrl, parse_url
+from service.mavlink.url import LinkKind, LinkUrl
 
 log = logging.getLogger("roisearch")
 AGAIN_S = 1.0
 TOLD_EVERY = 10
 
 
-def check_link(text: str, *, patient: bool = False) -> LinkUrl:
-    """The address of a link that can be opened now, before anything has been prepared for it: nobody is spoken to.
+def check_links(urls: Mapping[str, LinkUrl], *, resumed: bool, patient: bool) -> frozenset[str]:
+    """Whether the links of aircraft, by their names, can be opened now, before anything has been prepared for it:
+    nobody is spoken to. Returns whose cannot.
 
-    `patient`: wait for a link that cannot be opened, as long as that takes; it says so.
+    There are such only on a resumption (`resumed`) of several: one that is in the air is not left there for the link of
+    another one. `patient`: wait for the first link that can be opened, as long as that takes; it says so.
 
     Raises:
-        BadInput: as `parse_url`; its port is taken, its host is not known, its device is not there or may not be used.
+        BadInput: a port is taken, a host is not known, a device is not there or may not be used.
     """
-    url = parse_url(text)
     for tried in itertools.count():
-        try:
-            _check(url)
-        except LinkError as error:
-            if not patient:
-                raise BadInput(str(error)) from None
-            if tried % TOLD_EVERY == 0:
-                log.warning("%s; it is tried again, as an aircraft may be in the air", error)
-            time.sleep(AGAIN_S)
-        else:
-            break
-    return url
+        shut = {name: why for name, url in urls.items() if (why := _why_shut(url))}
+        some = len(shut) < len(urls)
+        if shut and not (patient or (resumed and some)):
+            name, why = next(iter(shut.items()))
+            raise BadInput(f"{_called(name)}{why}")
+        if tried % TOLD_EVERY == 0:
+            for name, why in shut.items():
+                goes_on = "; the others go on" if some else ""
+                log.warning(
+                    "%s%s; it is tried again, as an aircraft may be in the air%s", _called(name), why, goes_on
+                )
+        if some:
+            return frozenset(shut)
+        time.sleep(AGAIN_S)
+    raise AssertionError("it counts for ever")
+
+
+def _called(name: str) -> str:
+    return f"aircraft '{name}': " if name else ""
+
+
+def _why_shut(url: LinkUrl) -> str:
+    """Why a link cannot be opened, or nothing."""
+    try:
+        _check(url)
+    except LinkError as error:
+        return str(error)
+    return ""
 
 
 def _check(url: LinkUrl) -> None:

@@ -49,7 +49,8 @@ class MavlinkSettings:
     arming_patience_s: float = 0.0
     """How long arming is tried again when the vehicle refuses it."""
     wait_for_ever: bool = False
-    """Whether a vehicle that is not heard is waited for as long as that takes: it may be in the air."""
+    """Whether a link that cannot be opened is tried again, and a vehicle that is not heard waited for, as long as that
+    takes: it may be in the air."""
     ready_hold_s: float = 5.0
     """How long the pre-arm check must have stayed healthy (ArduPilot reports it healthy too early)."""
 

@@ -15,6 +15,7 @@ from typing import TypeVar
 from service.clock import Clock
 from service.mavlink.command import Command
 from service.mavlink.core import LinkCore
+from service.mavlink.errors import LinkError
 from service.mavlink.events import CommandDone, Outcome, VehicleEvent
 from service.mavlink.keeper import TimestampKeeper
 from service.mavlink.settings import MavlinkSettings
@@ -24,6 +25,7 @@ _T = TypeVar("_T")
 _TICK_S = 0.05
 _SHORTEST_TICK_WALL_S = 0.005
 _PATIENCE_WALL_S = 1.0
+_OPEN_AGAIN_WALL_S = 1.0
 
 
 class Shell:
@@ -50,12 +52,13 @@ class Shell:
         """Keep the link up for as long as the block lasts; raises as `Vehicle.open`."""
         if self._keeper is not None:
             self._keeper.begin()
-        await self._transport.open()
+        if not self.core.settings.wait_for_ever:
+            await self._transport.open()
         failure: Exception | None = None
         try:
             async with asyncio.TaskGroup() as group:
                 tasks = [
-                    group.create_task(self._transport.run(self.pump), name="mavlink wire"),
+                    group.create_task(self._keep_up(), name="mavlink wire"),
                     group.create_task(self._tick_for_ever(), name="mavlink tick"),
                 ]
                 if self._keeper is not None:
@@ -77,6 +80,16 @@ class Shell:
     def address(self) -> str:
         """The link's address, with the port in use."""
         return self._transport.address
+
+    async def _keep_up(self) -> None:
+        """Run the wire; where it is waited for, it is opened first."""
+        while self.core.settings.wait_for_ever:
+            try:
+                await self._transport.open()
+                break
+            except LinkError:  # which was said before anything was prepared
+                await asyncio.sleep(_OPEN_AGAIN_WALL_S)
+        await self._transport.run(self.pump)
 
     # ---- what happens
 

@@ -71,7 +71,7 @@ class Vehicle:
 
         Raises:
             BadInput: the address cannot be used, or the signing timestamp cannot be kept.
-            LinkError: the port or device cannot be opened.
+            LinkError: the port or device cannot be opened, and is not waited for.
         """
         shell = Shell(make_transport(parse_url(url)), clock, settings or MavlinkSettings())
         async with shell.running():

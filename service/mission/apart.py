@@ -23,16 +23,16 @@ from dataclasses import dataclass, replace
 import shapely
 
 from service.config import FlightSettings
+from service.config import gap_m as layer_gap_m
 from service.geometry import LatLon, moved, offset_m
 
 SLACK_M = 5.0
 """More than the separation is asked of a leg that is sent: positions are not exact, and paths not straight."""
-KEPT = 0.7
-"""The part of `flight.layer_m` that is left when both aircraft waver about their height."""
 STILL_M = 1.0  # whose stopping distance is shorter hovers
 ERODES_M = 0.5  # a leg that comes no nearer than it is now may come so much nearer
 LOOK_S = 5.0  # who is not steered by us may do anything for as long as it takes to see what it does
 FAILSAFE_S = 30.0  # after which an autopilot that hears nobody has begun its own way home
+SAME_M, LATE_S = 3.0, 1.0  # one place is told over two links, one of them later, with no more between
 SETTLES_S = 20.0  # from the ground under it to motors that stand still, and the last metres are flown slowly
 _SLOWER = 2.0  # than reckoned, at the most, is that way
 
@@ -61,7 +61,7 @@ class Spacing:
         """As the settings say."""
         return cls(
             flight.separation_m,
-            KEPT * flight.layer_m,
+            layer_gap_m(flight),
             flight.climb_mps,
             flight.descent_mps,
             max(flight.full_battery_s, flight.max_flight_s),
@@ -108,6 +108,8 @@ class Other:
         returns: its autopilot flies home and lands.
         claim: what it waits for.
         system_id: its MAVLink system id; None: not heard yet.
+        ended: its mission has.
+        home_amsl_m: how high home is above the sea, by its autopilot; NaN: not told.
     """
 
     name: str
@@ -125,10 +127,21 @@ class Other:
     returns: bool = False
     claim: Claim | None = None
     system_id: int | None = None
+    ended: bool = False
+    home_amsl_m: float = math.nan
 
     def sent(self, point: LatLon, up_m: float) -> Other:
         """The same aircraft, once it is sent to a point as well."""
         return replace(self, goals=(*self.goals, point), goals_up_m=(*self.goals_up_m, up_m))
+
+
+def same(own: Other, other: Other) -> bool:
+    """Whether another one is this aircraft, heard over a second link whose mission has ended for that: it has the same
+    MAVLink system id, and is where this one is, or was when that was told."""
+    if not other.ended or not own.system_id or other.system_id != own.system_id:
+        return False
+    flew_m = own.speed_mps * (abs(other.age_s - own.age_s) + LATE_S)
+    return math.hypot(*offset_m(own.place, other.place)) <= SAME_M + flew_m
 
 
 # ---- rooms
@@ -139,9 +152,10 @@ def rooms(other: Other, spacing: Spacing) -> tuple[Room, ...]:
 
     One that is not steered by us may be anywhere it can reach while we look. One that is not heard may be as far as it
     gets, at the heights of its leg; it may come down where its leg was, and its autopilot may fly it home. When it must
-    have done so it is on the ground or hovers where its leg was, until no battery lasts that long.
+    have done so it is on the ground or hovers where its leg was, until no battery lasts that long. One that flies and
+    has never told its place may be anywhere.
     """
-    if not other.in_air or other.age_s > spacing.battery_s:
+    if not other.in_air or spacing.battery_s < other.age_s < math.inf:
         return ()
     path = _path(other)
     if other.age_s > spacing.fresh_s:
@@ -363,7 +377,9 @@ def _right(other: Other) -> int:
 def _said(metres: float, other: Other, spacing: Spacing) -> str:
     if other.age_s > spacing.fresh_s:
         heard = (
-            f"has not been heard for {other.age_s:.0f} s" if math.isfinite(other.age_s) else "was never heard"
+            f"has not been heard for {other.age_s:.0f} s"
+            if math.isfinite(other.age_s)
+            else "flies and has never told its place"
         )
         return f"may come near {called(other)}, which {heard}"
     return (

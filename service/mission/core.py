@@ -25,6 +25,7 @@ from service.mission.chart import Chart, here
 from service.mission.departing import Waiting
 from service.mission.effects import (
     ACTIONS,
+    UNWRITTEN,
     Action,
     Answer,
     Brake,
@@ -51,6 +52,7 @@ from service.mission.flight import Flight
 from service.mission.grounded import Grounded
 from service.mission.guard import CRITICAL, guard
 from service.mission.helm import Helm
+from service.mission.holding import BLIND
 from service.mission.limits import Objection, no_stop
 from service.mission.logbook import Logbook
 from service.mission.news import (
@@ -65,6 +67,7 @@ from service.mission.news import (
     NotThought,
     Order,
     Thought,
+    Unwritten,
 )
 from service.mission.orders import concerned, gives_back, judged, ordered, sensible
 from service.mission.phase import (
@@ -110,7 +113,7 @@ from service.mission.states import (
     State,
     next_state,
 )
-from service.mission.traffic import Course
+from service.mission.traffic import Course, aloft
 from service.mission.untold import Untold
 from service.mission.watch import VehicleWatch
 from service.reasons import Reason
@@ -194,6 +197,8 @@ class MissionCore:
             case NotStopped(reason=reason):
                 self._emit(Note(f"no stop was sent: {reason}", _WARNING))
                 self._phase.lost(self._look())
+            case Unwritten(reason=reason):
+                self._go_home_unwritten(reason)
             case Done() | Failed():
                 self._ended(news)
             case _:
@@ -265,17 +270,21 @@ class MissionCore:
         return self._untold.battery
 
     def told(self, seen: Situation, now: float) -> Other:
-        """This aircraft as the other aircraft of the search are to see it: in the air from when it is about to be."""
-        if not math.isfinite(seen.telemetry.heartbeat_time) and may_be_aloft(self._flown_as, self.flight):
+        """This aircraft as the other aircraft of the search are to see it: in the air from when it is about to be, and
+        as an earlier process left it there until it says where it is, or that its motors stand still."""
+        t = seen.telemetry
+        placed, stands = math.isfinite(t.position_time), math.isfinite(t.heartbeat_time) and not aloft(t)
+        if not placed and not stands and may_be_aloft(self._flown_as, self.flight):
             climbs = self._flown_as.state == State.TAKEOFF
-            return self.helm.traffic.unheard(seen.telemetry, now, self.flight, climbs=climbs)
-        standing, heard = self.standing, now - seen.telemetry.heartbeat_time < self.terms.heartbeat_fresh_s
+            return self.helm.traffic.unheard(t, now, self.flight, climbs=climbs)
+        standing, heard = self.standing, now - t.heartbeat_time < self.terms.heartbeat_fresh_s
         course = Course(
             standing.state == State.TAKEOFF,
             standing.goes_home_by_itself,
             heard,
+            standing.state in FINAL,
         )
-        return self.helm.traffic.told(seen.telemetry, now, course)
+        return self.helm.traffic.told(t, now, course)
 
     def ahead(self, seen: Situation) -> list[LatLon]:
         """Where the aircraft goes from here as decided: its waypoint and the path beyond; empty when it does not."""
@@ -594,6 +603,24 @@ class MissionCore:
         if ordered:
             self._phase.lost(self._look())
             self._want(warn(f"{ordered} is not carried out: {wish.why}", self._look()))
+
+    def _go_home_unwritten(self, reason: str) -> None:
+        """Fly home although no row can be written any more, by our own way; from a hold in which that cannot be flown
+        once it can."""
+        standing, t = self.standing, self._seen.telemetry
+        if not t.in_control or on_ground(t):
+            return
+        if not isinstance(self.doing, UNWRITTEN):  # it waits for a row that will not be there
+            self._drop_action()
+        self._want([Settle("")])
+        if standing.state == State.RETURNING or standing.causes & BLIND:
+            self._phase.lost(self._look())
+            self._change(homeward=True, causes=standing.causes & BLIND)
+            self._change(why_stopped=standing.why_stopped or reason)
+            self._want(warn(reason, self._look()))
+        else:
+            event = Event.HOMEWARD if standing.state == State.READY else Event.RETURN
+            self._happen(Happen(event, reason, stopped=reason))
 
     # ---- news
 

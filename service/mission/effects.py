@@ -218,6 +218,8 @@ Effect = (
     | Action
 )
 ACTIONS = (SendWaypoint, Connect, WaitReady, EnterGuided, Arm, TakeOff, SetSpeed, ReturnToLaunch, Land)
+UNWRITTEN = (ReturnToLaunch, Land)
+"""Actions that wait for no disk."""
 
 
 def row(effect: Effect) -> WriteRow | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from service.mission.apart import Other
+from service.mission.apart import Other, same
 
 
 class Formation:
@@ -23,5 +23,8 @@ class Formation:
         return len(self._members) > 1
 
     def others(self, name: str) -> tuple[Other, ...]:
-        """All but the one of that name, those whose missions have ended among them."""
-        return tuple(told() for each, told in self._members.items() if each != name)
+        """All but the one of that name, and what is only a second link to it; those whose missions have ended among
+        them."""
+        own = self._members[name]()
+        others = (told() for each, told in self._members.items() if each != name)
+        return tuple(other for other in others if not same(own, other))

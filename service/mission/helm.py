@@ -90,6 +90,10 @@ class Helm:
         or is another mission's."""
         return self.too_far(t) or self._no_home(t, others) or self.traffic.twin(t, others)
 
+    def grounded(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """Why this aircraft must not take off as it stands there, or nothing."""
+        return self.unfit(t, others) or self.traffic.uneven(t, others) or self.too_empty(t, others)
+
     def _no_home(self, t: Telemetry, others: Sequence[Other]) -> str:
         """Why it must not land where its autopilot would, or nothing. Among others the last leg home is ours, too."""
         home, least = self._chart.home(t), self._chart.grid.clearance_m

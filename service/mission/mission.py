@@ -21,7 +21,7 @@ from service.evidence.intake import Intake
 from service.evidence.observe import FramePose, Observation
 from service.evidence.reports import OrderReceipt
 from service.geometry import Cell, LatLon
-from service.journal import Journal
+from service.journal import Journal, JournalLost
 from service.known import Withdrawn
 from service.looking import passed, worth_a_look
 from service.mavlink import LinkError, Vehicle
@@ -29,6 +29,7 @@ from service.mission.apart import Other
 from service.mission.core import MissionCore
 from service.mission.doing import do
 from service.mission.effects import (
+    UNWRITTEN,
     Action,
     Answer,
     Brake,
@@ -36,7 +37,6 @@ from service.mission.effects import (
     DropThought,
     Effect,
     ForgetAircraft,
-    Land,
     Learn,
     LetGo,
     Note,
@@ -44,7 +44,6 @@ from service.mission.effects import (
     PlanAnew,
     Reckon,
     Rest,
-    ReturnToLaunch,
     SendWaypoint,
     Stop,
     Tell,
@@ -67,6 +66,7 @@ from service.mission.news import (
     NotThought,
     Order,
     Thought,
+    Unwritten,
 )
 from service.mission.orders import STOPPING
 from service.mission.outlook import Outlook, pose_at
@@ -87,7 +87,6 @@ MOVING_ORDERS, JUDGING = ("resume", "launch"), ("confirm", "reject")
 _OVERTAKEN = (
     "the aircraft was stopped or taken over before it was carried out; order it again if it is wanted"
 )
-UNWRITTEN = (ReturnToLaunch, Land)
 MakeIntake = Callable[[Callable[[float], FramePose | None], Callable[[Observation, float], None]], Intake]
 
 
@@ -130,7 +129,7 @@ class Mission:
         self._stopwatch = stopwatch or Stopwatch()
         self._acting: asyncio.Task[None] | None = None
         self._thinking: asyncio.Task[None] | None = None
-        self._stopped = False
+        self._stopped = self._unwritten = False
         self._group = asyncio.TaskGroup()
         formation.join(search.aircraft, self.told)
 
@@ -218,7 +217,7 @@ class Mission:
             try:
                 while self.state not in FINAL:
                     if self._rows.lost is not None:
-                        raise self._rows.lost
+                        self._go_home_unwritten(self._rows.lost)
                     self._carry_out(self.core.tick(self._outlook.situation(), self.clock.now()))
                     await self.clock.sleep(TICK_S)
             finally:
@@ -295,6 +294,15 @@ class Mission:
                 log.error("%s", error)
                 self.vehicle.status_text(f"search ABORTED, hovering: {error}", 2)
         await self._linger()
+
+    def _go_home_unwritten(self, lost: JournalLost) -> None:
+        """Among others it flies home without a journal, past them and by the turn that they take to land: by their
+        autopilots all would fly at one height, at once. Raises JournalLost where that is not, or no longer, so."""
+        if not self._unwritten and self._outlook.formation.several:
+            self._unwritten = True
+            self._feed(Unwritten(str(lost)))
+        if not (self._unwritten and self.standing.comes_home):
+            raise lost
 
     async def _linger(self) -> None:
         """A last stop that is lost is sent again."""
@@ -398,8 +406,9 @@ class Mission:
 
     async def _act(self, action: Action) -> None:
         """Carry out an action once all rows before it are on disk, and tell the core how it ended. A return or a
-        landing by the autopilot waits for no disk."""
-        if not isinstance(action, UNWRITTEN) and not await self._rows.all_on_disk():
+        landing by the autopilot waits for no disk, nor does the way home of one that flies it without a journal."""
+        waits = not (self._unwritten or isinstance(action, UNWRITTEN))
+        if waits and not await self._rows.all_on_disk():
             return  # told by its own way
         patience = self.core.settings.link.connect_timeout_s
         news: News

@@ -54,6 +54,13 @@ class MapChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class Unwritten:
+    """The journal cannot be written any more, and there are other aircraft that the way home has to keep clear of."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Thought:
     """A decision is made; `reason` says it in words, `worth` which cells of its path have to be seen from the height of
     the search: over hills, those that are not less likely than others."""
@@ -108,6 +115,7 @@ News = (
     | Judged
     | Hit
     | MapChanged
+    | Unwritten
     | Thought
     | NotThought
     | Done

@@ -64,6 +64,11 @@ class Standing:
         return self.state in (State.RETURNING, State.FOUND)
 
     @property
+    def comes_home(self) -> bool:
+        """It flies home, or will once a hold on the way is over, or has."""
+        return self.state == State.DONE or (self.homeward and self.state in (State.RETURNING, State.HOLDING))
+
+    @property
     def goes_home_by_itself(self) -> bool:
         """The autopilot has been told to, or is about to be: which needs neither our waypoints nor our journal."""
         return self.state == State.RETURNING and (self.direct or self.autopilot_returns)

@@ -41,11 +41,12 @@ _CONE = 3.0  # an autopilot's own way home is at most so many times as high as i
 @dataclass(frozen=True, slots=True)
 class Course:
     """What is to be known of a mission beside its telemetry: whether it takes off (`climbs`), the autopilot flies home
-    (`returns`), and a heartbeat has come lately (`heard`)."""
+    (`returns`), a heartbeat has come lately (`heard`), and it has `ended`."""
 
     climbs: bool
     returns: bool
     heard: bool
+    ended: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,11 @@ class _Goal:
     point: LatLon
     up_m: float
     until: float = math.inf
+
+
+def aloft(t: Telemetry) -> bool:
+    """Whether its autopilot says that it flies, or may at any moment."""
+    return t.armed or t.landed_state in ("in_air", "takeoff", "landing")
 
 
 def brakes_at(start: LatLon, stands: LatLon, goals: Sequence[LatLon]) -> LatLon:
@@ -121,21 +127,23 @@ class Traffic:
     def told(self, t: Telemetry, now: float, course: Course) -> Other:
         """This aircraft as the others see it."""
         guided = t.guided or course.climbs
-        aloft = t.armed or t.landed_state in ("in_air", "takeoff", "landing")
         own = self._own(t, now)
         astray = (
             not own.goals and t.ground_speed_mps > _FLIES_MPS
         )  # where to, nobody has told (us, since we started)
         return replace(
             self._lands(own, t) if course.returns else own,
-            in_air=aloft or self._rises_to_m is not None or t.heartbeat_time < self._rose_at,
+            in_air=(aloft(t) and now - t.heartbeat_time <= self._spacing.battery_s)
+            or self._rises_to_m is not None
+            or t.heartbeat_time < self._rose_at,
             steered=t.in_control and guided and course.heard and not astray,
+            ended=course.ended,
         )
 
     def unheard(self, t: Telemetry, now: float, flight: Flight, *, climbs: bool) -> Other:
-        """This aircraft as the others are to see it when an earlier process left it in the air, and it has not been
-        heard since: where its journalled track ends, and on its way to where it was sent last. `climbs`: it was taking
-        off, as long as that process lived."""
+        """This aircraft as the others are to see it when an earlier process left it in the air, and it has not told
+        its place since: where its journalled track ends, and on its way to where it was sent last. `climbs`: it was
+        taking off, as long as that process lived."""
         at, lat, lon, up = flight.track[-1] if flight.track else (flight.told_at, *self._chart.home(t), 0.0)
         home_m, goals = self._heights.home_m, [] if flight.goal is None else [(flight.goal, up)]
         if climbs:
@@ -152,6 +160,7 @@ class Traffic:
             tuple(home_m + height for _, height in goals),
             age_s=now - at,
             steered=False,
+            system_id=t.system_id,
         )
 
     def _own(self, t: Telemetry, now: float) -> Other:
@@ -178,6 +187,7 @@ class Traffic:
             age_s=now - t.position_time,
             claim=self._claim if now - self._claimed_at <= CLAIM_S else None,
             system_id=t.system_id,
+            home_amsl_m=t.home_alt_amsl_m,
         )
 
     def _may_fly_to(self, t: Telemetry, now: float) -> list[_Goal]:
@@ -271,6 +281,23 @@ class Traffic:
                 return (
                     f"its autopilot has the MAVLink system id {t.system_id}, as that of {called(other)}: it may be the "
                     "same aircraft over two links; give each its own id (MAV_SYS_ID, SYSID_THISMAV)"
+                )
+        return ""
+
+    def uneven(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """Why its height above home is not comparable with that of another one above its own, or nothing: without a
+        ground file nothing else says how high they are. Who flies has its height, else the first by name."""
+        if self._heights.relief is not None:
+            return ""
+        most_m = self._flight.layer_m - self._spacing.gap_m
+        for other in others:
+            before = other.in_air or (not other.ended and other.name < self.name)
+            higher_m = t.home_alt_amsl_m - other.home_amsl_m
+            if before and abs(higher_m) > most_m:
+                return (
+                    f"home is {abs(higher_m):.0f} m {'higher' if higher_m > 0.0 else 'lower'} than that of "
+                    f"{called(other)}, more than the {most_m:g} m that the layers allow for: give the heights of the "
+                    "ground (--ground), or let both begin equally high"
                 )
         return ""
 

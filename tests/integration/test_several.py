@@ -81,3 +81,17 @@ def test_two_aircraft_outlive_a_kill_and_find_the_target_together(tmp_path: Path
     assert report["outcome"] == "found"
     assert [each["state"] for each in report["aircraft"]] == ["DONE", "DONE"]
     assert report["steps"] == sum(each["steps"] for each in report["aircraft"])
+
+
+def test_two_whose_journal_is_lost_fly_home_by_our_own_way_and_land(tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    words = service_words(write_area(tmp_path), runs, "--aircraft", "2", "--speedup", "20")
+    with running(*words) as service, the_door(service) as door:
+        wait_for(door, lambda each: each["state"] == "SEARCHING" and each["steps"] >= 1, service)
+        (folder,) = runs.iterdir()
+        (folder / "journal.sqlite").unlink()
+        assert service.exit_code(120.0) == 4, service.said
+    report = only_report(runs)
+    assert [each["state"] for each in report["aircraft"]] == ["DONE", "DONE"]
+    assert "has been deleted" in report["stopped_because"]
+    assert "Traceback" not in service.said

@@ -58,6 +58,12 @@ def test_each_aircraft_has_settings_as_if_it_flew_alone(tmp_path: Path) -> None:
     assert not second[1].mock
 
 
+def test_each_without_an_offset_flies_a_layer_above_the_one_before(tmp_path: Path) -> None:
+    third = '\naltitude_offset_m = 15\n[[aircraft]]\nconnect = "udpin://0.0.0.0:14542"\n'
+    alone = each_aircraft(read_settings(written(tmp_path, TWO + third), environment={}))
+    assert [each.flight.altitude_m for each in alone.values()] == [40.0, 55.0, 65.0]
+
+
 def test_without_tables_one_flies_with_the_settings_as_they_are() -> None:
     settings = read_settings(environment={})
     assert each_aircraft(settings) == {"": settings}
@@ -74,6 +80,10 @@ def test_without_tables_one_flies_with_the_settings_as_they_are() -> None:
         (
             ("speed_mps = 6", "altitude_offset_m = 90"),
             "aircraft '2': 'flight.altitude_m' = 130 is not between",
+        ),
+        (
+            ("speed_mps = 6", "altitude_offset_m = 6"),
+            "aircraft 'north' and '2' fly 6 m apart in height, which is less than the 7 m that two layers need",
         ),
         (("altitude_m = 40", 'altitude_m = 40\n[link]\nconnect = "udpin://:1"'), "'link.connect' is for one"),
         (("speed_mps", "speed"), "there is no setting 'speed' of an aircraft; there is name, connect"),

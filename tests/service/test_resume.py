@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.config import Settings
+from service.config import Settings, each_aircraft
 from service.errors import BadInput
 from service.journal import Journal
 from service.mission.orders import ASKED
@@ -23,6 +23,7 @@ from service.resume import (
     left_flight,
     left_standing,
     left_system_id,
+    stored_settings,
     why_over,
 )
 from service.run import resume
@@ -338,6 +339,41 @@ def test_what_flew_alone_before_is_the_first_ones(tmp_path: Path) -> None:
     journal, search = journal_of(tmp_path, UP), Search(GRID, Settings())
     assert left_standing(journal, search, Whose("north", first=True)).state == State.SEARCHING
     assert left_standing(journal, search, Whose("south", first=False)).state == State.WAITING
+
+
+def begun_alone(folder: Path, alone: Sequence[Step], first: Sequence[Step], second: Sequence[Step]) -> Path:
+    """A journal of a run that one aircraft began, and that then two went on with, who have the names of their numbers;
+    its settings are still those of one."""
+    journal_of(folder, alone)
+    with contextlib.closing(Journal(folder / JOURNAL)) as journal:
+        for name, steps in (("1", first), ("2", second)):
+            for before, event, to in steps:
+                body = {"from": before, "event": event, "to": to, "reason": "so", "aircraft": name}
+                journal.write(3000.0, "transition", body)
+    return folder / JOURNAL
+
+
+def test_what_flew_alone_and_then_beside_others_is_one_aircraft_everywhere(tmp_path: Path) -> None:
+    search = Search(GRID, Settings())
+    over = begun_alone(tmp_path / "over", UP, [*FOUND, LANDED], [*FOUND, LANDED])
+    assert why_over(over) == "so"  # that it searched before it was killed is no third one
+    taken = begun_alone(tmp_path / "taken", UP, TAKEN, UP)
+    assert left_standing(taken, search, Whose("", first=True)).state == State.YIELDED
+    assert left_standing(taken, search, Whose("1", first=True)).state == State.YIELDED
+    assert left_standing(taken, search, Whose("2", first=False)).state == State.SEARCHING
+    out = begun_alone(tmp_path / "out", UP, [*LOW, LANDED], UP)
+    assert left_standing(out, search, Whose("1", first=True)).state == State.DONE
+
+
+def test_who_went_on_with_a_run_last_goes_on_with_it_again(tmp_path: Path) -> None:
+    journal_of(tmp_path, UP)
+    links = ["udpin://0.0.0.0:14540", "udpin://0.0.0.0:14541"]
+    with contextlib.closing(Journal(tmp_path / JOURNAL)) as journal:
+        two = stored_settings(journal.path, {"aircraft": [{"connect": link} for link in links]})
+        note_resumption(journal, tmp_path, two)
+        again = stored_settings(journal.path, {})
+    assert [each.link.connect for each in each_aircraft(again).values()] == links
+    assert list(each_aircraft(again)) == ["1", "2"]
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,16 @@ def test_beside_one_that_somebody_else_flies_the_other_has_to_stand_soon(speed: 
         assert bool(judge.violations) == (guilty and now > 8.0)
 
 
+@pytest.mark.parametrize("between", [{"up": 60.0}, {"landed": "ON_GROUND"}])
+def test_each_encounter_has_a_grace_of_its_own(between: dict[str, Any]) -> None:
+    judge = Separation()
+    judge.taken = frozenset({"1"})
+    for now, apart in ((0.0, {}), (5.0, between), (60.0, {}), (69.0, {})):
+        here = {"time": now, "speed": 3.0}
+        judge.see({"1": state(0.0, 30.0) | here, "2": state(15.0, 30.0) | here | apart})
+        assert bool(judge.violations) == (now > 68.0)
+
+
 @pytest.mark.parametrize(("then", "guilty"), [(14.5, False), (13.0, True)])
 def test_who_is_given_back_too_near_to_another_one_comes_no_nearer(then: float, guilty: bool) -> None:
     judge = Separation()

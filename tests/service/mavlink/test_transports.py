@@ -9,12 +9,13 @@ import socket
 import time
 import tty
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from service.clock import Clock
-from service.mavlink import LinkError, Vehicle
+from service.mavlink import LinkError, MavlinkSettings, Vehicle
 from service.mavlink.transports import StreamTransport, make_transport
 from service.mavlink.url import parse_url
 
@@ -163,6 +164,30 @@ def test_serial_port_that_is_not_there_is_one_sentence() -> None:
 
     with pytest.raises(LinkError, match="no-such-port"):
         asyncio.run(main())
+
+
+def test_a_device_that_is_waited_for_is_opened_once_it_is_there(tmp_path: Path) -> None:
+    async def main() -> None:
+        device, waits = tmp_path / "by-id", MavlinkSettings(wait_for_ever=True)
+        url = f"serial://{device}:57600"
+        master, slave = pty.openpty()
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+        try:
+            async with (
+                asyncio.timeout(30.0),
+                Vehicle.open(url, clock=Clock(SPEEDUP), settings=waits) as vehicle,
+            ):
+                await asyncio.sleep(0.2)
+                device.symlink_to(os.ttyname(slave))
+                task = asyncio.create_task(speak(lambda data: os.write(master, data), Peer()))
+                await vehicle.connect(100.0)
+                task.cancel()
+        finally:
+            os.close(master)
+            os.close(slave)
+
+    asyncio.run(main())
 
 
 def test_pulled_cable_is_noticed() -> None:

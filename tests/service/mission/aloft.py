@@ -18,6 +18,7 @@ from service.evidence.sensors import make_sensor
 from service.journal import Journal
 from service.mavlink import MavlinkSettings, Vehicle
 from service.mission.core import MissionCore
+from service.mission.formation import Formation
 from service.mission.mission import Mission
 from service.mission.standing import Terms
 from service.mission.states import State
@@ -32,7 +33,9 @@ PATIENCE_S = 60.0
 
 
 @asynccontextmanager
-async def aloft(folder: Path, flavor: str = "px4") -> AsyncIterator[Mission]:
+async def aloft(
+    folder: Path, flavor: str = "px4", formation: Formation | None = None
+) -> AsyncIterator[Mission]:
     """A search under way over the soak's field, with a detector that sees nothing."""
     settings = Settings.model_validate(
         {
@@ -64,6 +67,7 @@ async def aloft(folder: Path, flavor: str = "px4") -> AsyncIterator[Mission]:
                     vehicle=vehicle,
                     journal=journal,
                     make_intake=make_intake,
+                    formation=formation,
                 )
                 tasks = [asyncio.create_task(mission.run()), asyncio.create_task(_look(mission))]
                 try:

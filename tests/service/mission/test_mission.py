@@ -7,12 +7,15 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from service.journal import read_rows
+from service.mission.apart import Other
+from service.mission.formation import Formation
 from service.mission.states import State
 from tests.service.mission.aloft import aloft, until
 from tests.service.mission.flown import HERE
@@ -63,6 +66,29 @@ def test_a_journal_that_another_program_locks_holds_and_the_search_goes_on_after
                 await until(mission, lambda: mission.vehicle.telemetry.ground_speed_mps < 0.5)
             await until(mission, lambda: mission.state == State.SEARCHING)
             await until(mission, lambda: mission.flight.waypoints > waypoints)
+
+    asyncio.run(fly())
+
+
+def test_among_others_a_lost_journal_leads_home_past_them_and_one_at_a_time(tmp_path: Path) -> None:
+    """By itself its autopilot would climb to its own height at once, as would those of all the others."""
+
+    async def fly() -> None:
+        formation = Formation()
+        async with aloft(tmp_path, formation=formation) as mission:
+            t = mission.vehicle.telemetry
+            home, up = mission.core.chart.home(t), t.alt_home_m
+            beside = Other("2", home, up, home, home, 60.0, 8.0)
+            formation.join("2", lambda: beside)
+            mission.journal.path.unlink()
+            await until(mission, lambda: mission.state == State.RETURNING)
+            assert "has been deleted" in mission.standing.why_stopped
+            for _ in range(30):
+                assert mission.vehicle.telemetry.guided  # it waits for who is over home
+                assert mission.vehicle.telemetry.alt_home_m == pytest.approx(up, abs=3.0)
+                await mission.clock.sleep(1.0)
+            beside = replace(beside, in_air=False)
+            await until(mission, lambda: mission.state == State.DONE)
 
     asyncio.run(fly())
 

@@ -14,7 +14,7 @@ from service.mission.apart import SETTLES_S, Claim, Other, Room, Spacing, home_b
 from service.mission.core import MissionCore
 from service.mission.effects import Arm, EnterGuided, Note, ReturnToLaunch, SendWaypoint, Stop
 from service.mission.flight import Flight
-from service.mission.news import NotSent, Order
+from service.mission.news import NotSent, Order, Unwritten
 from service.mission.standing import Standing, Terms
 from service.mission.states import State
 from sim.soak import ground
@@ -440,6 +440,69 @@ def test_who_lands_where_another_one_lands_is_told_before_the_take_off(
     assert ("from that of aircraft 1" in talk.core.standing.why) == bool(said)
 
 
+LOST = "the journal cannot be written: the disk is full"
+
+
+@pytest.mark.parametrize(
+    "state", [State.TAKEOFF, State.SEARCHING, State.CONFIRMING, State.FOUND, State.HOLDING, State.RETURNING]
+)
+def test_without_a_journal_the_way_home_among_others_is_our_own(state: State) -> None:
+    talk = named(reached(state))
+    talk.shows(landed_state="in_air", armed=True, in_control=True, alt_home_m=15.0, alt_amsl_m=415.0)
+    talk.flew(FAR)
+    talk.sees(others=(other(HERE),))
+    talk.on(Unwritten(LOST))
+    assert talk.state == State.RETURNING
+    assert talk.core.standing.comes_home
+    assert LOST in (talk.core.standing.why_stopped, talk.core.standing.why) or state == State.RETURNING
+    talk.pass_by(2.0)
+    assert isinstance(talk.doing(), SendWaypoint)
+    assert not any(isinstance(effect, ReturnToLaunch) for effect in talk.wanted)
+
+
+def test_without_a_journal_one_that_holds_blind_goes_home_once_it_sees_and_what_is_not_ours_does_not() -> (
+    None
+):
+    talk = named(searching())
+    talk.silent.add("position")
+    talk.pass_by(4.0)
+    assert talk.core.standing.causes == {"position"}
+    talk.on(Unwritten(LOST))
+    assert (talk.state, talk.core.standing.comes_home) == (State.HOLDING, True)
+    talk.silent.clear()
+    talk.pass_by(20.0)
+    assert talk.state == State.RETURNING
+    yielded = named(reached(State.YIELDED))
+    yielded.on(Unwritten(LOST))
+    assert (yielded.state, yielded.core.standing.comes_home) == (State.YIELDED, False)
+
+
+@pytest.mark.parametrize(
+    ("another", "refused"),
+    [
+        ({"home_amsl_m": 410.0}, True),
+        ({"home_amsl_m": 402.5}, False),
+        ({}, False),
+        ({"home_amsl_m": 410.0, "name": "9", "in_air": False}, False),  # whose take-off is refused then
+        ({"home_amsl_m": 410.0, "name": "9"}, True),
+        ({"home_amsl_m": 410.0, "ended": True, "in_air": False}, False),
+    ],
+)
+def test_without_a_ground_file_who_would_fly_at_anothers_height_does_not_take_off(
+    another: dict[str, Any], refused: bool
+) -> None:
+    talk = on_the_ground()
+    talk.sees(others=(other(FAR, **another),))
+    talk.done()
+    talk.pass_by(2.0)
+    assert (talk.state == State.ABORTED) == refused
+    if refused:
+        assert talk.core.standing.why.startswith("home is 10 m lower than that of aircraft ")
+        assert "more than the 3 m that the layers allow for" in talk.core.standing.why
+    else:
+        assert isinstance(talk.doing(), EnterGuided)
+
+
 SPACING = Spacing.of(Talk().settings.flight, 2.0)
 LAST = place(180.0, 120.0)
 
@@ -484,6 +547,36 @@ def test_until_it_is_heard_it_may_fly_to_where_it_was_sent_last() -> None:
     talk.sees(telemetry=searching().seen.telemetry)
     heard = talk.core.told(talk.seen, talk.now)
     assert (heard.place, heard.goals) == (HERE, ())
+
+
+def test_a_heartbeat_alone_ends_no_room_until_the_place_is_told_too() -> None:
+    talk = left_behind(State.SEARCHING)
+    talk.shows(heartbeat_time=START, armed=True, landed_state="in_air", system_id=2)
+    told = talk.core.told(talk.seen, talk.now)
+    assert (told.in_air, told.steered, told.place, told.goals, told.system_id) == (
+        True,
+        False,
+        LAST,
+        (FAR,),
+        2,
+    )
+    below = other(HOME, up=0.0, name="3")
+    assert objection(below, below.sent(HOME, 15.0), (told,), SPACING)
+    talk.core.leave("it was not connected in time", talk.seen, talk.now)
+    assert talk.core.told(talk.seen, talk.now) == told
+    talk.shows(armed=False, landed_state="on_ground")
+    assert not talk.core.told(talk.seen, talk.now).in_air
+
+
+def test_one_that_flies_and_has_never_told_its_place_may_be_anywhere() -> None:
+    talk = Talk()
+    talk.sees(telemetry=Telemetry(heartbeat_time=START, armed=True, landed_state="in_air"))
+    told = talk.core.told(talk.seen, talk.now)
+    far = other(FAR, up=90.0, name="3")
+    said = objection(far, far.sent(HERE, 90.0), (told,), SPACING)
+    assert said == "may come near aircraft , which flies and has never told its place"
+    silent_for_long = talk.core.told(talk.seen, talk.now + SPACING.battery_s + 1.0)
+    assert not objection(far, far.sent(HERE, 90.0), (silent_for_long,), SPACING)
 
 
 @pytest.mark.parametrize(

@@ -277,7 +277,7 @@ class TakingOff(Phase):
             yield WriteRow(CommandRow("take off", height_m=self._height_m))
             yield Stand()
             t = look.seen.telemetry
-            if why := look.helm.unfit(t, look.seen.others) or look.helm.too_empty(t, look.seen.others):
+            if why := look.helm.unfit(t, look.seen.others) or look.helm.too_empty(look.seen):
                 yield self._in_vain(why, look)
             elif beside := lands_beside(look):
                 yield from warn(beside, look)

@@ -243,7 +243,7 @@ class Searching(Phase):
             speed = t.ground_speed_mps if navigator.interrupted else navigator.speed_mps
             speed = speed if math.isfinite(speed) else 0.0  # not told: as one that stands
             left = look.battery_left()
-            left = None if left is None else left.after(remaining / look.settings.flight.speed_mps)
+            left = None if left is None else left.after(remaining / look.speed_mps)
             yield Think(navigator.waypoint, navigator.heading, navigator.ahead, speed, left)
         if look.busy:
             return

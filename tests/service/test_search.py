@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from roisearch.planners.tour.planner import TourPlanner
 from service.config import MOCK_SPEEDUP, PlannerName, Settings
 from service.evidence.observe import Observation
 from service.geometry import Cell
-from service.known import Judgement
+from service.known import Judgement, Known
 from service.mission.energy import Left
 from service.motion import MotionLimits
 from service.search import GETS_READY_S, Search
@@ -170,3 +171,46 @@ def test_what_is_told_of_a_find_is_worked_out_once_for_each_word(monkeypatch: py
     again = it.found()
     assert again is not None
     assert again.probability < confirmed.probability
+
+
+@pytest.mark.parametrize("what", ["there is none yet", "all is worth something else"])
+def test_a_plan_that_was_made_in_a_hurry_is_made_again_beside_the_flight(what: str) -> None:
+    """A clue or an exclusion leaves a decision's deadline for what took seconds on the ground."""
+    built = search(deadline_s=0.02)
+    state = SearchState(GRID.start, "north", 8.0)
+    if what.startswith("all"):
+        built.warm_up()
+        asyncio.run(built.decide(state, ()))
+        told = Known(GRID, 0.9, 0.9)
+        told.belief.observe(
+            [(row, col) for row, col in np.argwhere(GRID.searchable) if row % 3], False, 0.7, 0.9
+        )
+        built.go_back(told)
+    hasty = built.planner
+    first = asyncio.run(built.decide(state, ()))
+    asyncio.run(built.decide(state, ()))  # which waits for nothing
+    assert built._draft is not None  # how long it takes is told nowhere
+    built._draft.planner.result(timeout=60.0)
+    path = first.path[:4]
+    then = SearchState(path[-1], direction_between(path[-2], path[-1]), 8.0)
+    after = asyncio.run(built.decide(then, path))
+    assert built.planner is built.ending.planner is not hasty
+    assert direction_between(then.cell, after.path[0]) in DIRECTIONS
+    drafted = built.planner
+    for _ in range(3):
+        asyncio.run(built.decide(then, path))
+    assert built.planner is drafted  # it is as good as it gets
+    assert built._draft is None
+
+
+def test_a_plan_for_ground_that_is_another_one_by_now_is_not_flown() -> None:
+    built = search(deadline_s=0.02)
+    asyncio.run(built.decide(SearchState(GRID.start), ()))
+    assert built._draft is not None
+    built._draft.planner.result(timeout=60.0)
+    flyable = GRID.flyable.copy()
+    flyable[0] = False
+    built._fly_on(replace(GRID, flyable=flyable))
+    planner = built.planner
+    asyncio.run(built.decide(SearchState(GRID.start), ()))
+    assert built.planner is planner

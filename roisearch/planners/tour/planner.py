@@ -86,6 +86,8 @@ class TourPlanner:
         self._heading = 0  # of the last decision's state
         self._drifted = 0  # how often the target has walked on since the tour was made
         self._turn = False  # whether the last spell was at the front
+        self.hasty = False
+        """Whether the tour was made with fewer than its first spells of annealing; see `Hasty`."""
 
     def plan(
         self,
@@ -267,6 +269,7 @@ class TourPlanner:
         self._path = []
         self._at = state.cell[0] * belief.shape[1] + state.cell[1]
         self._idle = self._since = self._drifted = 0
+        self.hasty = False
         desk = self._desk
         desk.clear()
         desk.stand(state.cell, direction_index(state.heading))
@@ -290,6 +293,7 @@ class TourPlanner:
             spells = min(spells - 1, int((until - now) / max(now - began, 1e-6)))
         elif began >= until:
             spells = 0
+        self.hasty = spells < s.first - 1
         if spells > 0:
             count = max(1, min(s.starts, spells * s.proposals // (LEAST_PROPOSALS * desk.size)))
             desk.anneal_best(starts[:count], spells // count * s.proposals, (hot, cold), self._random)

@@ -362,3 +362,13 @@ def test_what_is_hardly_worth_a_look_comes_last_in_a_lawnmower_of_levels() -> No
     for order in list(swept(cells, worth, 4, 0))[PLAIN:]:
         assert sorted(order.tolist()) == cells.tolist()
         assert set(order[-6:].tolist()) == {3, 4, 5, 6, 7, 8}
+
+
+@pytest.mark.parametrize(("deadline_s", "hasty"), [(None, False), (60.0, False), (0.01, True)])
+def test_a_tour_says_when_there_was_no_time_to_make_a_good_one(deadline_s: float | None, hasty: bool) -> None:
+    planner = TourPlanner(TourSettings(looks=300), fov=FieldOfView.point(0.9, 0.95), motion=MOTION)
+    rng, belief = np.random.default_rng(0), Belief(hill(14, 15))
+    planner.plan(belief, SearchState((0, 0), "east"), rng, deadline_s=deadline_s)
+    assert planner.hasty is hasty
+    planner.plan(belief, SearchState((0, 0), "east"), rng)
+    assert planner.hasty is hasty  # the same plan

@@ -33,6 +33,8 @@ LEAST_PROPOSALS = 300
 """The fewest changes proposed a look for which one more start is worth it."""
 DRIFTS = 400
 """How often a target may walk on before the tour is made anew: seldom, as a tour that was kept is the better one."""
+ASTRAY = 12
+"""Cells beside its last path; from farther away the tour is made anew, not flown to."""
 TIED = 0.99
 """Looks that are worth as much as this part of the least one that is planned are as good as it."""
 
@@ -149,11 +151,12 @@ class TourPlanner:
         mark = belief.follow(LOOKED).mark()
         touched = None if self._mark is None else self._touched(belief, mark, self._mark)
         self._mark = mark
+        walked = touched is None and belief.walks is not None and self._drifted < DRIFTS
+        if self._lost(state.cell, belief.shape[1]) or (touched is None and not walked):
+            self._load(belief, state, until)
+            return
         if touched is None:
-            if belief.walks is None or self._drifted >= DRIFTS or self._lost(state.cell, belief.shape[1]):
-                self._load(belief, state, until)
-            else:
-                self._drift(belief, state)
+            self._drift(belief, state)
             return
         desk, cols = self._desk, belief.shape[1]
         flown = self._fly(state.cell[0] * cols + state.cell[1])
@@ -179,9 +182,12 @@ class TourPlanner:
             self._carry_on(belief)
 
     def _lost(self, cell: Cell, cols: int) -> bool:
-        """Whether there is no tour that leads to `cell`."""
-        flat = cell[0] * cols + cell[1]
-        return self._known.size == 0 or (flat != self._at and flat not in self._path)
+        """Whether there is no tour that leads to `cell`, or nearly there."""
+        if self._known.size == 0:
+            return True
+        rows, columns = np.divmod(np.array([self._at, *self._path]), cols)
+        away = np.maximum(np.abs(rows - cell[0]), np.abs(columns - cell[1]))
+        return bool(away.min() > ASTRAY)
 
     def _drift(self, belief: Belief, state: SearchState) -> None:
         """The target has walked on: what all looks are worth has changed, and the tour leads where it did for now.

@@ -387,3 +387,11 @@ def test_ground_that_others_have_searched_is_not_where_the_tour_goes_first() -> 
     planner.plan(belief, state, rng)
     ahead = planner.ahead(60)
     assert sum(cell in searched for cell in ahead) < 30  # some lie on the way
+
+
+def test_a_tour_begins_where_the_aircraft_is_when_it_is_far_from_where_it_was() -> None:
+    belief, rng = Belief(np.ones((40, 40))), np.random.default_rng(2)
+    planner = planner_on(np.ones((40, 40)))
+    planner.plan(belief, SearchState((0, 0), "east"), rng)
+    planner.plan(belief, SearchState((39, 39), "north"), rng)
+    assert all(max(cell) > 35 for cell in planner.ahead(30))

@@ -519,13 +519,13 @@ class Search:
         if (
             motion is not None and as_set is self.as_set
         ):  # the aircraft that flew it is not another one by now
-            self._thread.submit(self._reckon_with, motion).result()
+            self._move_as(motion).result()
 
     def forget_motion(self) -> None:
         """The aircraft is another one: it moves as the settings say, until it has told or flown."""
         flight, cell_m = self.settings.flight, self.grid.frame.cell_m
-        self.motion = self.as_set = motion_of(flight, cell_m, diagonal=self.fov.is_point)
-        self._thread.submit(self._reckon_with, self.as_set)
+        self.as_set = motion_of(flight, cell_m, diagonal=self.fov.is_point)
+        self._move_as(self.as_set)
 
     def limit(self, limits: MotionLimits) -> None:
         """Reckon with what the aircraft's parameters allow; what was learnt in flight stays."""
@@ -537,10 +537,14 @@ class Search:
             unlearnt = self.motion is self.as_set
             self.as_set = within(self.as_set, limits)
             if unlearnt:
-                self._thread.submit(self._reckon_with, self.as_set)
+                self._move_as(self.as_set)
+
+    def _move_as(self, motion: Motion) -> Future[None]:
+        """The aircraft moves so, as is known from now on; the planner reckons with it from its next decision."""
+        self.motion = motion
+        return self._thread.submit(self._reckon_with, motion)
 
     def _reckon_with(self, motion: Motion) -> None:
-        self.motion = motion
         self.ending.reckon_with(motion)
         if isinstance(self.planner, InSeconds):
             self.planner.reckon_with(motion)

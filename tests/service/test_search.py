@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from dataclasses import replace
 from typing import Any
 
@@ -89,6 +90,18 @@ def test_what_the_parameters_of_the_aircraft_allow_is_what_the_planner_reckons_w
     built.limit(MotionLimits(2.0, None))
     assert built.motion is learnt  # what it does says more than what it may
     assert built.as_set.speed_mps == 2.0
+
+
+def test_of_two_limits_that_come_while_the_planner_thinks_the_second_counts() -> None:
+    built, done = search(), threading.Event()
+    built._thread.submit(done.wait)
+    built.limit(MotionLimits(5.0, None))
+    built.limit(MotionLimits(3.0, None))
+    done.set()
+    asyncio.run(built.decide(SearchState(GRID.start), ()))
+    assert built.motion.speed_mps == 3.0
+    assert isinstance(built.planner, TourPlanner)
+    assert built.planner._desk.prices.axis[0] == pytest.approx(CELL_M / 3.0)
 
 
 def test_the_default_plans_the_end_of_a_battery_and_another_planner_does_not() -> None:

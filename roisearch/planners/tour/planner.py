@@ -301,11 +301,12 @@ class TourPlanner:
         if desk.size <= 2:
             return
         hot, cold = self._heat(s.heat_first), 0.03 * self._heat(s.heat_first)
-        spells, began = s.first, time.perf_counter()
+        spells, began, spell_s = s.first, time.perf_counter(), 0.0
         if np.isfinite(until) and spells > 0 and began < until:  # one spell tells how long they take
             desk.anneal(1, desk.size, s.proposals, (cold, cold), self._random)
             now = time.perf_counter()
-            spells = min(spells - 1, int((until - now) / max(now - began, 1e-6)))
+            spell_s = max(now - began, 1e-6)
+            spells = min(spells - 1, int((until - now) / spell_s))
         elif began >= until:
             spells = 0
         self.hasty = spells < s.first - 1
@@ -313,7 +314,7 @@ class TourPlanner:
             count = max(1, min(s.starts, spells * s.proposals // (LEAST_PROPOSALS * desk.size)))
             desk.anneal_best(starts[:count], spells // count * s.proposals, (hot, cold), self._random)
         if spells > 0 and desk.lawnmowers:
-            keep_up(desk, desk.lawnmowers, self._heat(1.0), self._random, until)
+            keep_up(desk, desk.lawnmowers, self._heat(1.0), self._random, until, spell_s / s.proposals)
 
     def _ranked(self, belief: Belief) -> Ints:
         """The cells to look at, the best first, those about equally good in the order of a lawnmower: int [n].

@@ -94,13 +94,14 @@ def test_what_the_parameters_of_the_aircraft_allow_is_what_the_planner_reckons_w
 
 def test_of_two_limits_that_come_while_the_planner_thinks_the_second_counts() -> None:
     built, done = search(), threading.Event()
-    built._thread.submit(done.wait)
+    built._thread.submit(done.wait)  # nothing public keeps it thinking for so long
     built.limit(MotionLimits(5.0, None))
     built.limit(MotionLimits(3.0, None))
     done.set()
     asyncio.run(built.decide(SearchState(GRID.start), ()))
     assert built.motion.speed_mps == 3.0
     assert isinstance(built.planner, TourPlanner)
+    # what its kernels are handed is told nowhere, and is what counts
     assert built.planner._desk.prices.axis[0] == pytest.approx(CELL_M / 3.0)
 
 
@@ -219,11 +220,12 @@ def test_a_plan_that_was_made_in_a_hurry_is_made_again_beside_the_flight(what: s
 def test_a_plan_for_ground_that_is_another_one_by_now_is_not_flown() -> None:
     built = search(deadline_s=0.02)
     asyncio.run(built.decide(SearchState(GRID.start), ()))
-    assert built._draft is not None
-    built._draft.planner.result(timeout=60.0)
+    draft = built._draft  # when it is ready is told nowhere
+    assert draft is not None
+    draft.planner.result(timeout=60.0)
     flyable = GRID.flyable.copy()
     flyable[0] = False
-    built._fly_on(replace(GRID, flyable=flyable))
+    built.common.fly_on(replace(GRID, flyable=flyable))
     planner = built.planner
     asyncio.run(built.decide(SearchState(GRID.start), ()))
     assert built.planner is planner

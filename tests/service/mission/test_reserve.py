@@ -55,6 +55,7 @@ def home_s(talk: Talk) -> tuple[float, float]:
     for percent in (89.0, 88.0, 87.0, 86.0):
         talk.shows(battery_percent=percent)
         talk.tick(10.0)
+    # what a decision is handed, without the wait for one
     home, left = talk.core.reserve.energy.home, talk.core._look().battery_left()
     assert left is not None
     across = Reach(GRID, talk.settings.flight).home_s(left) - left.upright_s

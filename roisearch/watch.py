@@ -167,6 +167,10 @@ class LookCounts:
         twin._rescaled, twin._tally, twin._trail = self._rescaled, self._tally.copy(), self._trail.copy()
         return twin
 
+    def looked(self) -> NDArray[np.bool_]:
+        """Which cells were looked at, flat, bool [cells]."""
+        return np.asarray(self._tally.any(axis=1))
+
     def raised(self, cells: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which of `cells` [k], flat indices, are more probable, beside the others, than before the looks.
 

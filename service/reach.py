@@ -81,7 +81,9 @@ class Reach:
         ways = self._ways
         assert ways is not None
         rows, cols = self._grid.frame.shape
-        seconds = np.bincount(ways.owners, legs_seconds(ways.legs, left.wind, self._flight), rows * cols)
+        seconds = np.bincount(
+            ways.owners, legs_seconds(ways.legs, left.wind, self._flight, left.speed_mps), rows * cols
+        )
         seconds[ways.none] = np.inf
         upright = ways.upright_s if ways.upright_s.size else left.upright_s
         return np.asarray((seconds + upright).reshape(rows, cols))

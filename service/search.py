@@ -18,9 +18,10 @@ import numpy as np
 
 from roisearch import Belief, Decision, Motion, Regions, SearchState, make_planner, segment_regions
 from roisearch.detection import DetectionRecord
+from roisearch.directions import direction_between
 from roisearch.motion_fit import Flown
 from roisearch.place import Place
-from roisearch.planners.base import InSeconds, Planner
+from roisearch.planners.base import Hasty, InSeconds, Planner
 from roisearch.planners.ending import EndingPlanner
 from roisearch.planners.ending.settings import EndingSettings
 from roisearch.walk import MOST_S
@@ -57,6 +58,8 @@ KEEPS_ITS_PLAN = "puct-regions-lite"
 """The default planner; it can fly on by its first plan without thinking."""
 GETS_READY_S = 20.0
 """No aircraft arms, takes off and climbs to its height in less, in the time of the search."""
+DRAFTED_AFTER_S = 3.0
+"""A plan that is made beside the flight begins where the aircraft is so many seconds later."""
 FORESEEING_S = 0.002
 """What a decision of another one may take where thousands are foreseen."""
 
@@ -66,6 +69,13 @@ class Foreseeing(NamedTuple):
 
     planner: Planner
     deadline_s: float | None
+
+
+class Draft(NamedTuple):
+    """A planner whose plan is made beside the flight, and the one that flies meanwhile."""
+
+    planner: Future[Planner]
+    instead_of: Planner
 
 
 def begin(grid: Grid, settings: Settings) -> Common:
@@ -117,6 +127,7 @@ class Search:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
         self._school = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._learning: Future[None] | None = None
+        self._draft: Draft | None = None
         self.expected_s: float | None = None
         """Seconds to the first detection, by the last decision; None: it did not count them."""
         self._rng = np.random.default_rng(settings.run.seed)
@@ -244,7 +255,7 @@ class Search:
             self.ending = self.ending_of(self.planner)
             self._plans_otherwise()
             thought = self.belief.copy() if belief is None else belief
-            self.planner.plan(thought, SearchState(self.grid.start), self._rng, deadline_s=deadline_s)
+            _plan_at_leisure(self.planner, thought, SearchState(self.grid.start), self._rng, deadline_s)
 
     def redrawn(self, now: float) -> Sketch | None:
         """Regions that are ready to be written down and taken (`take_sketch`), if there are any; looks for the next.
@@ -414,19 +425,24 @@ class Search:
         `left` is what the battery leaves from there on; None: enough, or not known. A target that walks is searched for
         where it may be at `now`, seconds since the epoch, and later.
         """
+        self._take_draft()
         thought = self.belief.copy()
         if now is not None and self.known.time is not None:
             thought.drift(min(max(0.0, now - self.known.time), MOST_S))
-        for step in ahead:
-            cells, p_tp, p_tn = self.fov.looks(step, state.heading, self.grid.frame.shape)
-            if self.visibility is not None:
-                p_tp = covered_p_tp(p_tp, p_tn, self.visibility[cells[:, 0], cells[:, 1]])
-            thought.observe(cells, np.zeros(len(cells), dtype=np.bool_), p_tp, p_tn)
+        self._look_in_vain(thought, ahead, state.heading)
         think = functools.partial(self._decide, thought, state, left, now)
         decision = await asyncio.get_running_loop().run_in_executor(self._thread, think)
         if self._together and now is not None:  # here, where what nobody waits for any more does not come
             self.common.others.commit(self.aircraft, decision, state, thought.shape, now_s=now)
         return decision
+
+    def _look_in_vain(self, thought: Belief, path: Sequence[Cell], heading: str) -> None:
+        """Let `thought` be as it will be when nothing was seen from `path`."""
+        for step in path:
+            cells, p_tp, p_tn = self.fov.looks(step, heading, self.grid.frame.shape)
+            if self.visibility is not None:
+                p_tp = covered_p_tp(p_tp, p_tn, self.visibility[cells[:, 0], cells[:, 1]])
+            thought.observe(cells, np.zeros(len(cells), dtype=np.bool_), p_tp, p_tn)
 
     def _decide(self, thought: Belief, state: SearchState, left: Left | None, now: float | None) -> Decision:
         """In the planner's thread: plan, for the end of the battery when it is near enough to matter."""
@@ -435,10 +451,49 @@ class Search:
         known = left is not None and self.reach.knows(left.home)  # else the battery's end is not planned yet
         near = left is not None and left.spare_s <= self.settings.search.battery_end_s
         endurance = self.reach.endurance(left) if left is not None and known and near else None
-        deadline = self.settings.search.deadline_s
+        deadline, planner = self.settings.search.deadline_s, self.planner
         decision = self.ending.plan(thought, state, self._rng, deadline_s=deadline, endurance=endurance)
         self.expected_s = -decision.value if isinstance(self.planner, InSeconds) else None
+        if isinstance(planner, Hasty) and planner.hasty:
+            self._begin_draft(planner, thought, state, decision)
         return decision
+
+    def _begin_draft(self, hasty: Planner, thought: Belief, state: SearchState, decision: Decision) -> None:
+        """A decision left no time for a good plan: have one made beside the flight, which goes on by the hasty one
+        until then."""
+        if self._draft is not None:
+            return
+        times = self.arrivals(decision.path, state.cell, state.heading, state.speed_mps)
+        flown = decision.path[: max(1, int(np.searchsorted(times, DRAFTED_AFTER_S)))]
+        self._look_in_vain(thought, flown, state.heading)
+        before = (state.cell, *flown)[-2]
+        there = SearchState(flown[-1], direction_between(before, flown[-1]), self.motion.speed_mps)
+        rng = self._rng.spawn(1)[0]
+        self._draft = Draft(self._school.submit(self._plan_beside, thought, there, rng), hasty)
+
+    def _plan_beside(self, thought: Belief, state: SearchState, rng: np.random.Generator) -> Planner:
+        planner = self._make_planner()
+        _plan_at_leisure(planner, thought, state, rng, GETS_READY_S / self.settings.speedup)
+        return planner
+
+    def _take_draft(self) -> None:
+        """Go on by a plan that was made beside the flight, if one is ready, unless the ground is another one by now."""
+        if self._draft is None or not self._draft.planner.done():
+            return
+        draft, self._draft = self._draft, None
+        if failure := draft.planner.exception():
+            log.error(
+                "a plan that was made beside the flight has failed, which goes on as it was: %s", failure
+            )
+        elif self.planner is draft.instead_of:
+            self.planner = self.ending.planner = draft.planner.result()
+            self._thread.submit(self._catch_up, self.planner)
+            self._plans_otherwise()
+
+    def _catch_up(self, planner: Planner) -> None:
+        """In the planner's thread: what was learnt while `planner` made its plan."""
+        if isinstance(planner, InSeconds):
+            planner.reckon_with(self.motion)
 
     def arrivals(
         self, path: Sequence[Cell], start: Cell, heading: str = "north", speed_mps: float = 0.0
@@ -468,13 +523,13 @@ class Search:
         if (
             motion is not None and as_set is self.as_set
         ):  # the aircraft that flew it is not another one by now
-            self._thread.submit(self._reckon_with, motion).result()
+            self._move_as(motion).result()
 
     def forget_motion(self) -> None:
         """The aircraft is another one: it moves as the settings say, until it has told or flown."""
         flight, cell_m = self.settings.flight, self.grid.frame.cell_m
-        self.motion = self.as_set = motion_of(flight, cell_m, diagonal=self.fov.is_point)
-        self._thread.submit(self._reckon_with, self.as_set)
+        self.as_set = motion_of(flight, cell_m, diagonal=self.fov.is_point)
+        self._move_as(self.as_set)
 
     def limit(self, limits: MotionLimits) -> None:
         """Reckon with what the aircraft's parameters allow; what was learnt in flight stays."""
@@ -486,10 +541,14 @@ class Search:
             unlearnt = self.motion is self.as_set
             self.as_set = within(self.as_set, limits)
             if unlearnt:
-                self._thread.submit(self._reckon_with, self.as_set)
+                self._move_as(self.as_set)
+
+    def _move_as(self, motion: Motion) -> Future[None]:
+        """The aircraft moves so, as is known from now on; the planner reckons with it from its next decision."""
+        self.motion = motion
+        return self._thread.submit(self._reckon_with, motion)
 
     def _reckon_with(self, motion: Motion) -> None:
-        self.motion = motion
         self.ending.reckon_with(motion)
         if isinstance(self.planner, InSeconds):
             self.planner.reckon_with(motion)
@@ -497,3 +556,12 @@ class Search:
     def reason(self, decision: Decision, cell: Cell) -> Reason:
         """The decision in words: where to, how much is there, how far, and what else was weighed."""
         return explain(decision, cell, self.belief.probability(), self.regions, self.grid.frame.cell_m)
+
+
+def _plan_at_leisure(
+    planner: Planner, belief: Belief, state: SearchState, rng: np.random.Generator, deadline_s: float | None
+) -> None:
+    """Make a first plan with as much time as there is, which is as good as it gets."""
+    planner.plan(belief, state, rng, deadline_s=deadline_s)
+    if isinstance(planner, Hasty):
+        planner.hasty = False

@@ -63,6 +63,15 @@ class InSeconds(Protocol):
 
 
 @runtime_checkable
+class Hasty(Protocol):
+    """A planner that keeps its plan from one decision to the next, and says when it had no time to make a good one."""
+
+    hasty: bool
+    """Whether the plan was made within the deadline of a decision that left no time for all that makes it good. Whoever
+    has another one made in its place, with more time, may say that it is not."""
+
+
+@runtime_checkable
 class Redrawable(Protocol):
     """A planner that goes on with other regions of the same map."""
 

@@ -116,10 +116,18 @@ class SurveyPlanner:
         self._path = []
 
     def _begin(self, belief: Belief, at: int, heading: int) -> None:
-        """Lay the lanes, or lay them anew when all were flown."""
+        """Lay the lanes, or lay them anew when all were flown.
+
+        The first lanes of a planner that takes over from another one, on the next flight or over other ground, lead
+        over what was not looked at yet.
+        """
         across = self._fov.offsets[1][:, 0]
         swath = int(across.max() - across.min()) + 1
         wanted = belief.weights.reshape(belief.shape) > 0.0
+        if self._order.size == 0 and belief.walks is None:
+            assert self._part is not None
+            left = wanted & self._part.viewable & ~self._looked.looked().reshape(belief.shape)
+            wanted = left if left.any() else wanted
         orders = lawnmowers(wanted, self._reach, swath)
         if not orders:
             orders = [np.flatnonzero(self._reach)]

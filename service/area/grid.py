@@ -139,15 +139,10 @@ class Grid:
         Raises:
             BadInput: no cell stays.
         """
-        labels, count = ndimage.label(self.flyable & clear)
-        if not count:
-            raise BadInput(f"no cell of the area can be flown: {why}")
-        parts = np.arange(1, count + 1)
-        mass, size = (
-            ndimage.sum_labels(self.prior, labels, parts),
-            ndimage.sum_labels(labels > 0, labels, parts),
-        )
-        flyable = labels == np.lexsort((-size, -mass))[0] + 1
+        labels, best_first = _parts_to_fly(self.flyable & clear, self.prior)
+        if not best_first.size:
+            raise BadInput(f"no cell of the area can be flown, or one alone: {why}")
+        flyable = labels == best_first[0]
         lost = self.flyable & ~flyable
         notes = self.layout_notes
         if lost.any():
@@ -414,10 +409,13 @@ def _reachable_part(
     coordinates: Coordinates,
 ) -> tuple[BoolArray, LatLon, tuple[str, ...]]:
     """One connected part (4 neighbours) of the allowed cells, the launch point, and what to tell about it."""
-    labels, count = ndimage.label(allowed)
-    mass = ndimage.sum_labels(prior, labels, np.arange(1, count + 1))
-    size = ndimage.sum_labels(allowed, labels, np.arange(1, count + 1))
-    best_first = np.lexsort((-size, -mass)) + 1
+    labels, best_first = _parts_to_fly(allowed, prior)
+    if not best_first.size:
+        raise where.bad(
+            "no cell to fly over has another one beside it, and a search flies from cell to cell; take smaller cells, "
+            "a larger area or smaller exclusions"
+        )
+    count = int(labels.max())
     notes: tuple[str, ...] = ()
     part = labels == best_first[0]
     if launch is None:
@@ -446,6 +444,16 @@ def _reachable_part(
             f"{share(float(prior[part].sum()))} of the prior is flown, {share(lost)} lies in the others.",
         )
     return part, launch, notes
+
+
+def _parts_to_fly(allowed: BoolArray, mass: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """The connected parts (4 neighbours) of the allowed cells: labels [rows, cols], and those of parts with more than
+    one cell, which is where a planner has somewhere to go, the one with the most mass first, int [n]."""
+    labels, count = ndimage.label(allowed)
+    parts = np.arange(1, count + 1)
+    held, size = ndimage.sum_labels(mass, labels, parts), ndimage.sum_labels(allowed, labels, parts)
+    best_first = np.lexsort((-size, -held))
+    return labels, best_first[size[best_first] > 1] + 1
 
 
 def _prior_notes(prior: FloatArray, searchable: BoolArray, flyable: BoolArray) -> tuple[str, ...]:

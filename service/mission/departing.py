@@ -276,8 +276,7 @@ class TakingOff(Phase):
             self._begun = True
             yield WriteRow(CommandRow("take off", height_m=self._height_m))
             yield Stand()
-            t = look.seen.telemetry
-            if why := look.helm.grounded(t, look.seen.others):
+            if why := look.helm.grounded(look.seen):
                 yield self._in_vain(why, look)
             elif beside := lands_beside(look):
                 yield from warn(beside, look)

@@ -121,26 +121,31 @@ class Consumption:
         return self._rate
 
 
-def speed_over_ground(leg: Metres, wind: Wind | None, flight: FlightSettings) -> float:
+def speed_over_ground(
+    leg: Metres, wind: Wind | None, flight: FlightSettings, speed_mps: float | None = None
+) -> float:
     """Metres a second that the aircraft makes good along a leg (its vector in metres) in a wind.
 
-    It flies at `flight.speed_mps` over ground where it can, and through the air never faster than
+    It flies at `speed_mps` over ground where it can, None: at `flight.speed_mps`; and through the air never faster than
     `flight.max_airspeed_mps`: of that, the part that keeps it on the leg against a wind from the side is lost.
     """
+    calm = flight.speed_mps if speed_mps is None else speed_mps
     length = math.hypot(*leg)
     if wind is None or length == 0.0:
-        return flight.speed_mps
+        return calm
     east, north = leg[0] / length, leg[1] / length
     along = wind.east_mps * east + wind.north_mps * north
     across = wind.east_mps * north - wind.north_mps * east
     ahead = math.sqrt(max(flight.max_airspeed_mps**2 - across**2, 0.0))
-    return min(flight.speed_mps, ahead + along)
+    return min(calm, ahead + along)
 
 
-def legs_seconds(legs: NDArray[np.float64], wind: Wind | None, flight: FlightSettings) -> NDArray[np.float64]:
+def legs_seconds(
+    legs: NDArray[np.float64], wind: Wind | None, flight: FlightSettings, speed_mps: float | None = None
+) -> NDArray[np.float64]:
     """Seconds for each of many legs, (east, north) in metres [n, 2], as `WayHome.along` reckons them, float [n]."""
     length = np.hypot(*legs.T)
-    speed = np.full(len(legs), flight.speed_mps)
+    speed = np.full(len(legs), flight.speed_mps if speed_mps is None else speed_mps)
     if wind is not None:
         east, north = legs.T / np.maximum(length, 1e-9)
         along, across = (
@@ -180,9 +185,10 @@ class WayHome:
         wind: Wind | None,
         flight: FlightSettings,
         return_m: float | None = None,
+        speed_mps: float | None = None,
     ) -> WayHome:
         """The way through points (here first, home last), with a stop at each, from a height above home in metres,
-        flown at `return_m` above home; None: as the autopilot's own return is set.
+        flown at `return_m` above home, None: as the autopilot's own return is set; and at `speed_mps`, None: as asked.
 
         Its seconds are infinite when the wind does not let the aircraft get there.
         """
@@ -190,7 +196,7 @@ class WayHome:
         for here, there in pairwise(points):
             leg = (there[0] - here[0], there[1] - here[1])
             metres = math.hypot(*leg)
-            speed = speed_over_ground(leg, wind, flight)
+            speed = speed_over_ground(leg, wind, flight, speed_mps)
             if metres > 0.0 and speed < _SLOWEST_MPS:
                 seconds = math.inf
             elif metres > 0.0:
@@ -209,7 +215,7 @@ class WayHome:
 class Left:
     """What a battery leaves, in seconds from now: until the aircraft must be on the ground, and until its search must
     be over wherever it is; `here_s` is the way home from here, `upright_s` of them climb and descent. With the place
-    where it lands and the wind."""
+    where it lands, the wind, and the speed of the way home, None: as asked."""
 
     ground_s: float
     search_s: float
@@ -217,6 +223,7 @@ class Left:
     upright_s: float
     home: LatLon
     wind: Wind | None = None
+    speed_mps: float | None = None
 
     @property
     def spare_s(self) -> float:
@@ -244,6 +251,8 @@ class Energy:
     wind: Wind | None = None
     doubt: str = ""
     """Why it is not told for all that, as the end of a sentence: what is told stands still, say."""
+    speed_mps: float | None = None
+    """How fast it flies home; None: as asked."""
 
     def needed(self) -> float | None:
         """Percent of the battery that the way home needs; None while that is not known."""
@@ -268,7 +277,7 @@ class Energy:
         waits, here = self.home.waits_s, self.home.seconds - self.home.waits_s
         ground = (level - flight.reserve_percent) / self.percent_per_s - waits
         search = min((level - flight.min_battery_percent) / self.percent_per_s, flight.max_flight_s - flown_s)
-        return Left(ground, search, here, self.home.upright_s, home, self.wind)
+        return Left(ground, search, here, self.home.upright_s, home, self.wind, self.speed_mps)
 
     def objection(self, flown_s: float, flight: FlightSettings) -> str:
         """Why the aircraft must fly home now, or nothing; it has been in the air for `flown_s` seconds."""

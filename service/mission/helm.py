@@ -29,7 +29,7 @@ from service.mission.limits import (
     reference_objection,
     wind_objection,
 )
-from service.mission.situation import on_ground
+from service.mission.situation import Situation, on_ground
 from service.mission.traffic import Traffic
 
 WINDY_S = 5.0
@@ -90,9 +90,10 @@ class Helm:
         or is another mission's."""
         return self.too_far(t) or self._no_home(t, others) or self.traffic.twin(t, others)
 
-    def grounded(self, t: Telemetry, others: Sequence[Other]) -> str:
+    def grounded(self, seen: Situation) -> str:
         """Why this aircraft must not take off as it stands there, or nothing."""
-        return self.unfit(t, others) or self.traffic.uneven(t, others) or self.too_empty(t, others)
+        t, others = seen.telemetry, seen.others
+        return self.unfit(t, others) or self.traffic.uneven(t, others) or self.too_empty(seen)
 
     def _no_home(self, t: Telemetry, others: Sequence[Other]) -> str:
         """Why it must not land where its autopilot would, or nothing. Among others the last leg home is ours, too."""
@@ -111,13 +112,13 @@ class Helm:
             return ""
         return f"home is {_metres(away)} from the launch point, more than {_metres(limit)}; is it the right area file?"
 
-    def too_empty(self, t: Telemetry, others: Sequence[Other] = ()) -> str:
+    def too_empty(self, seen: Situation) -> str:
         """Why the battery does not let it take off, for the way out and home and the wait for others, or nothing."""
-        flight, start = self._flight, self._chart.latlon(self._chart.grid.start)
-        way_s = 2.0 * self._chart.distance(here(t), start) / flight.speed_mps
+        t, flight, start = seen.telemetry, self._flight, self._chart.latlon(self._chart.grid.start)
+        way_s = 2.0 * self._chart.distance(here(t), start) / seen.flies_mps(flight.speed_mps)
         height = max(self.heights.highest_return_m([here(t), start]), flight.return_height_m)
         up_s, down_s = height / flight.climb_mps, height / flight.descent_mps
-        return take_off_objection(t, way_s + up_s + down_s + self.traffic.wait_s(t, others), flight)
+        return take_off_objection(t, way_s + up_s + down_s + self.traffic.wait_s(t, seen.others), flight)
 
     def far(self, t: Telemetry) -> str:
         """That home is not at the launch point, when a person should know, or nothing."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from roisearch import Motion
 from roisearch.directions import STEPS, direction_between, direction_index
@@ -67,6 +67,14 @@ class Navigator:
     _worth: frozenset[Cell] = frozenset()
     _at_once: bool = False
     _nearest_m: float = math.inf
+
+    def __post_init__(self) -> None:
+        self._set_brake = self.motion.pace.brake
+
+    def learn(self, motion: Motion) -> None:
+        """More is known of how the aircraft moves. That it brakes harder than it is set to is not relied on: a target
+        that comes too late costs more than one that comes too early."""
+        self.motion = replace(motion, braking_mps2=min(motion.pace.brake, self._set_brake))
 
     def begin(self, cell: Cell, heading: str) -> None:
         """Forget everything; the aircraft is at `cell`, or on its way there and nowhere further."""

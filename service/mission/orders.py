@@ -169,7 +169,7 @@ def _refusal(command: str, look: Look) -> str:
     if command == "launch":
         if not look.terms.may_take_off:
             return "this service was not allowed to arm or take off (--takeoff)"
-        return look.helm.grounded(t, look.seen.others)
+        return look.helm.grounded(look.seen)
     if command == "replace" and look.heard() and not on_ground(t):
         return "the aircraft that is heard does not stand on the ground with its motors off"
     return ""

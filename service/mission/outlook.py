@@ -64,6 +64,7 @@ class Outlook:
             missing=tuple(self.vehicle.missing()) if standing.state in (State.READY, State.GROUNDED) else (),
             others=self.formation.others(search.aircraft),
             over=search.over() if self.formation.several else "",
+            motion=search.motion,
         )
 
     def _suspect_in_view(self) -> bool:

@@ -32,9 +32,18 @@ class Reserve:
         self.wind: Wind | None = None
         """As told, else as reckoned; None while it is not known."""
 
-    def update(self, t: Telemetry, now: float, *, under_way: bool, waits_s: float = 0.0) -> None:
+    def update(
+        self,
+        t: Telemetry,
+        now: float,
+        *,
+        under_way: bool,
+        waits_s: float = 0.0,
+        speed_mps: float | None = None,
+    ) -> None:
         """Take in what the vehicle tells now; nothing on the ground, and the battery alone while the position is
-        not known. `waits_s`: how long it may have to wait over home for others to land."""
+        not known. `waits_s`: how long it may have to wait over home for others to land; `speed_mps`: how fast it flies
+        there, None: as asked."""
         if on_ground(t):
             return
         if t.battery_percent is not None:
@@ -44,12 +53,13 @@ class Reserve:
         if t.position_known and t.landed_state == "in_air":
             self.wind = self._wind.update(t, under_way, now)
         if t.position_known:  # whatever it says of the ground: what is armed may fly
-            home = WayHome.along(self._way(t), t.alt_home_m, self.wind, self._flight, self._return_m)
+            way, up_m = self._way(t), t.alt_home_m
+            home = WayHome.along(way, up_m, self.wind, self._flight, self._return_m, speed_mps)
             home = home.waiting(waits_s)
         level, doubt = percent, self._level.doubt
         if told := t.battery_percent is not None and not doubt:
             level = self._consumption.level(t.battery_percent, now)
-        self.energy = Energy(percent, rate, home, told, t.battery_state, level, self.wind, doubt)
+        self.energy = Energy(percent, rate, home, told, t.battery_state, level, self.wind, doubt, speed_mps)
 
     def forget_way(self) -> None:
         """Other ground is excluded now: the way home may lead elsewhere."""

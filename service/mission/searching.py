@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from roisearch import Motion
 from roisearch.motion import Leg
 from service.chances import share, sure
 from service.geometry import Cell, LatLon
@@ -69,6 +70,7 @@ class Searching(Phase):
     def __init__(self, look: Look) -> None:
         flight = look.settings.flight
         self._navigator = Navigator(motion_of(flight, look.chart.frame.cell_m), flight.speed_mps)
+        self._motion: Motion | None = None  # as last learnt
         self._lessons = Lessons()
         self._limits = MotionLimits()  # as last told
         self._ground = look.chart.grid
@@ -99,6 +101,9 @@ class Searching(Phase):
         if limits != self._limits:
             self._limits = limits
             yield Reckon(limits)
+        if look.seen.motion is not None and look.seen.motion is not self._motion:
+            self._motion = look.seen.motion
+            self._navigator.learn(self._motion)
         if not self._speed_sent and not look.busy:
             self._speed_sent = True
             yield Begin()
@@ -243,7 +248,7 @@ class Searching(Phase):
             speed = t.ground_speed_mps if navigator.interrupted else navigator.speed_mps
             speed = speed if math.isfinite(speed) else 0.0  # not told: as one that stands
             left = look.battery_left()
-            left = None if left is None else left.after(remaining / look.settings.flight.speed_mps)
+            left = None if left is None else left.after(remaining / look.speed_mps)
             yield Think(navigator.waypoint, navigator.heading, navigator.ahead, speed, left)
         if look.busy:
             return

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
+from roisearch import Motion
 from service.evidence.found import Found
 from service.mavlink.telemetry import Telemetry
 from service.mission.apart import Other
@@ -25,6 +27,7 @@ class Situation:
     `suspect_in_view`: a frame taken now shows it. `missing`: what the aircraft lacks that a search needs, as sentences'
     ends. `others`: the other aircraft of the same
     search; `over`: why that is over for all of them, which is told where there are others.
+    `motion`: how the aircraft moves, as far as is known by now; None: as the settings say.
     """
 
     telemetry: Telemetry = field(default_factory=Telemetry)
@@ -45,6 +48,13 @@ class Situation:
     missing: tuple[str, ...] = ()
     others: tuple[Other, ...] = ()
     over: str = ""
+    motion: Motion | None = None
+
+    def flies_mps(self, asked_mps: float) -> float:
+        """How fast the aircraft flies when it is asked to at `asked_mps`: slower where its parameters, or what was
+        learnt in flight, say that it cannot; metres a second over ground in no wind."""
+        told = self.telemetry.most_speed_mps or math.inf
+        return min(asked_mps, told, math.inf if self.motion is None else self.motion.speed_mps)
 
 
 def on_ground(t: Telemetry) -> bool:

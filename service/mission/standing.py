@@ -152,6 +152,11 @@ class Look:
     terms: Terms
     ordered: str = ""
 
+    @property
+    def speed_mps(self) -> float:
+        """How fast the aircraft flies: as the settings ask, or slower where it cannot, metres a second."""
+        return self.seen.flies_mps(self.settings.flight.speed_mps)
+
     def energy_low(self) -> str:
         """Why the aircraft must fly home now, or nothing."""
         return self.energy.objection(self.flight.aloft_s(self.now), self.settings.flight)

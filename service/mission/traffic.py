@@ -35,6 +35,7 @@ LOST_STOP_S = 10.0  # after which a stop or another point has arrived, or is kno
 _NAMED_M, _FLIES_MPS = 2.0, 1.0
 KEPT_S = 12.0  # who was left no leg for so long tries it from elsewhere
 CLAIM_S = 3.0  # what is waited for is asked for every second
+SAME_GROUND_M = 30.0
 _CONE = 3.0  # an autopilot's own way home is at most so many times as high as it is long
 
 
@@ -286,14 +287,18 @@ class Traffic:
 
     def uneven(self, t: Telemetry, others: Sequence[Other]) -> str:
         """Why its height above home is not comparable with that of another one above its own, or nothing: without a
-        ground file nothing else says how high they are. Who flies has its height, else the first by name."""
+        ground file nothing else says how high they are. Who flies has its height, else the first by name.
+
+        Homes side by side are on the same ground, whatever two receivers make of its height.
+        """
         if self._heights.relief is not None:
             return ""
         most_m = self._flight.layer_m - self._spacing.gap_m
         for other in others:
             before = other.in_air or (not other.ended and other.name < self.name)
             higher_m = t.home_alt_amsl_m - other.home_amsl_m
-            if before and abs(higher_m) > most_m:
+            far = math.hypot(*offset_m(self._chart.home(t), other.home)) > SAME_GROUND_M
+            if before and far and abs(higher_m) > most_m:
                 return (
                     f"home is {abs(higher_m):.0f} m {'higher' if higher_m > 0.0 else 'lower'} than that of "
                     f"{called(other)}, more than the {most_m:g} m that the layers allow for: give the heights of the "

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from roisearch.planners.tour.planner import TourPlanner
 from service.config import MOCK_SPEEDUP, PlannerName, Settings
 from service.evidence.observe import Observation
 from service.geometry import Cell
-from service.known import Judgement
+from service.known import Judgement, Known
 from service.mission.energy import Left
 from service.motion import MotionLimits
 from service.search import GETS_READY_S, Search
@@ -88,6 +90,19 @@ def test_what_the_parameters_of_the_aircraft_allow_is_what_the_planner_reckons_w
     built.limit(MotionLimits(2.0, None))
     assert built.motion is learnt  # what it does says more than what it may
     assert built.as_set.speed_mps == 2.0
+
+
+def test_of_two_limits_that_come_while_the_planner_thinks_the_second_counts() -> None:
+    built, done = search(), threading.Event()
+    built._thread.submit(done.wait)  # nothing public keeps it thinking for so long
+    built.limit(MotionLimits(5.0, None))
+    built.limit(MotionLimits(3.0, None))
+    done.set()
+    asyncio.run(built.decide(SearchState(GRID.start), ()))
+    assert built.motion.speed_mps == 3.0
+    assert isinstance(built.planner, TourPlanner)
+    # what its kernels are handed is told nowhere, and is what counts
+    assert built.planner._desk.prices.axis[0] == pytest.approx(CELL_M / 3.0)
 
 
 def test_the_default_plans_the_end_of_a_battery_and_another_planner_does_not() -> None:
@@ -170,3 +185,47 @@ def test_what_is_told_of_a_find_is_worked_out_once_for_each_word(monkeypatch: py
     again = it.found()
     assert again is not None
     assert again.probability < confirmed.probability
+
+
+@pytest.mark.parametrize("what", ["there is none yet", "all is worth something else"])
+def test_a_plan_that_was_made_in_a_hurry_is_made_again_beside_the_flight(what: str) -> None:
+    """A clue or an exclusion leaves a decision's deadline for what took seconds on the ground."""
+    built = search(deadline_s=0.02)
+    state = SearchState(GRID.start, "north", 8.0)
+    if what.startswith("all"):
+        built.warm_up()
+        asyncio.run(built.decide(state, ()))
+        told = Known(GRID, 0.9, 0.9)
+        told.belief.observe(
+            [(row, col) for row, col in np.argwhere(GRID.searchable) if row % 3], False, 0.7, 0.9
+        )
+        built.go_back(told)
+    hasty = built.planner
+    first = asyncio.run(built.decide(state, ()))
+    asyncio.run(built.decide(state, ()))  # which waits for nothing
+    assert built._draft is not None  # how long it takes is told nowhere
+    built._draft.planner.result(timeout=60.0)
+    path = first.path[:4]
+    then = SearchState(path[-1], direction_between(path[-2], path[-1]), 8.0)
+    after = asyncio.run(built.decide(then, path))
+    assert built.planner is built.ending.planner is not hasty
+    assert direction_between(then.cell, after.path[0]) in DIRECTIONS
+    drafted = built.planner
+    for _ in range(3):
+        asyncio.run(built.decide(then, path))
+    assert built.planner is drafted  # it is as good as it gets
+    assert built._draft is None
+
+
+def test_a_plan_for_ground_that_is_another_one_by_now_is_not_flown() -> None:
+    built = search(deadline_s=0.02)
+    asyncio.run(built.decide(SearchState(GRID.start), ()))
+    draft = built._draft  # when it is ready is told nowhere
+    assert draft is not None
+    draft.planner.result(timeout=60.0)
+    flyable = GRID.flyable.copy()
+    flyable[0] = False
+    built.common.fly_on(replace(GRID, flyable=flyable))
+    planner = built.planner
+    asyncio.run(built.decide(SearchState(GRID.start), ()))
+    assert built.planner is planner

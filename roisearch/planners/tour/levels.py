@@ -41,24 +41,30 @@ def times_to(desk: Desk) -> Floats:
 
 
 def keep_up(
-    desk: Desk, lawnmowers: list[Ints], step_heat: float, random: NDArray[np.uint64], until: float
+    desk: Desk,
+    lawnmowers: list[Ints],
+    step_heat: float,
+    random: NDArray[np.uint64],
+    until: float,
+    proposal_s: float = 0.0,
 ) -> bool:
     """Put an annealed lawnmower in the place of a tour that is late; whether it was done.
 
     Args:
         desk: with the settled tour. lawnmowers: orders of its nodes, the best first, one or more.
         step_heat: the temperature of one second of a step. random: uint64 [1], the state of the draws.
-        until: when to have ended, by `time.perf_counter`; then the tour stays.
+        until: when to have ended, by `time.perf_counter`; what would not be over by then is not begun.
+        proposal_s: seconds that a proposed change takes, as far as is known.
     """
     best, chosen, reached = desk.cost, desk.order(), times_to(desk)
     desk.put(lawnmowers[0])
     soon = LATER * times_to(desk)
-    kept = chosen
+    kept, takes_s = chosen, PROPOSALS * desk.size * proposal_s
     if not (reached <= soon).all():
         found: list[tuple[float, int, Ints]] = []
         for order in lawnmowers[:LAWNMOWERS]:
             for gentle in GENTLE:
-                if time.perf_counter() >= until:
+                if time.perf_counter() + takes_s >= until:
                     break
                 desk.put(order)
                 heat = gentle * step_heat

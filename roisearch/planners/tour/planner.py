@@ -33,6 +33,8 @@ LEAST_PROPOSALS = 300
 """The fewest changes proposed a look for which one more start is worth it."""
 DRIFTS = 400
 """How often a target may walk on before the tour is made anew: seldom, as a tour that was kept is the better one."""
+ASTRAY = 12
+"""Cells beside its last path; from farther away the tour is made anew, not flown to."""
 TIED = 0.99
 """Looks that are worth as much as this part of the least one that is planned are as good as it."""
 
@@ -86,6 +88,8 @@ class TourPlanner:
         self._heading = 0  # of the last decision's state
         self._drifted = 0  # how often the target has walked on since the tour was made
         self._turn = False  # whether the last spell was at the front
+        self.hasty = False
+        """Whether the tour was made with fewer than its first spells of annealing; see `Hasty`."""
 
     def plan(
         self,
@@ -147,11 +151,12 @@ class TourPlanner:
         mark = belief.follow(LOOKED).mark()
         touched = None if self._mark is None else self._touched(belief, mark, self._mark)
         self._mark = mark
+        walked = touched is None and belief.walks is not None and self._drifted < DRIFTS
+        if self._lost(state.cell, belief.shape[1]) or (touched is None and not walked):
+            self._load(belief, state, until)
+            return
         if touched is None:
-            if belief.walks is None or self._drifted >= DRIFTS or self._lost(state.cell, belief.shape[1]):
-                self._load(belief, state, until)
-            else:
-                self._drift(belief, state)
+            self._drift(belief, state)
             return
         desk, cols = self._desk, belief.shape[1]
         flown = self._fly(state.cell[0] * cols + state.cell[1])
@@ -166,8 +171,9 @@ class TourPlanner:
         self._known[cells] = actual
         self._settle(belief)
         wrong = (np.abs(actual - expected) > 0.25 * expected) & self._reach.ravel()[cells]
+        usual = desk.worth / max(desk.size, 1)
         for cell in cells[wrong].tolist():
-            self._expect(belief, cell)
+            self._expect(belief, cell, usual)
         if wrong.any():
             self._settle(belief)
             self._idle = 0
@@ -176,9 +182,12 @@ class TourPlanner:
             self._carry_on(belief)
 
     def _lost(self, cell: Cell, cols: int) -> bool:
-        """Whether there is no tour that leads to `cell`."""
-        flat = cell[0] * cols + cell[1]
-        return self._known.size == 0 or (flat != self._at and flat not in self._path)
+        """Whether there is no tour that leads to `cell`, or nearly there."""
+        if self._known.size == 0:
+            return True
+        rows, columns = np.divmod(np.array([self._at, *self._path]), cols)
+        away = np.maximum(np.abs(rows - cell[0]), np.abs(columns - cell[1]))
+        return bool(away.min() > ASTRAY)
 
     def _drift(self, belief: Belief, state: SearchState) -> None:
         """The target has walked on: what all looks are worth has changed, and the tour leads where it did for now.
@@ -241,8 +250,9 @@ class TourPlanner:
                 self._desk.remove(int(self._desk.tour.place[looks[0]]))
         return flown
 
-    def _expect(self, belief: Belief, cell: int) -> None:
-        """Let the looks at `cell` be worth what the belief says, and put in those that it makes worth it."""
+    def _expect(self, belief: Belief, cell: int, usual: float) -> None:
+        """Let the looks at `cell` be worth what the belief says, where they are worth that, and put in those that it
+        makes worth it. The tour must be settled after; `usual` is what its looks are worth on average."""
         desk, worth = self._desk, float(self._p[cell]) * float(belief.weights[cell])
         looks = desk.looks_at(cell)
         for k in range(MOST_LOOKS):
@@ -253,6 +263,13 @@ class TourPlanner:
                     desk.remove(int(desk.tour.place[looks[k]]))
                     self._settle(belief)
                     desk.insert(cell, worth)
+                elif 2.0 * worth < known:  # others looked there: first comes what they left
+                    desk.remove(int(desk.tour.place[looks[k]]))
+                    if worth > usual:
+                        self._settle(belief)
+                        desk.insert(cell, worth)
+                    elif worth > 0.0:
+                        desk.append(cell, worth)
             elif worth > self._least and desk.space > 0:
                 self._settle(belief)
                 desk.insert(cell, worth)
@@ -267,6 +284,7 @@ class TourPlanner:
         self._path = []
         self._at = state.cell[0] * belief.shape[1] + state.cell[1]
         self._idle = self._since = self._drifted = 0
+        self.hasty = False
         desk = self._desk
         desk.clear()
         desk.stand(state.cell, direction_index(state.heading))
@@ -283,18 +301,20 @@ class TourPlanner:
         if desk.size <= 2:
             return
         hot, cold = self._heat(s.heat_first), 0.03 * self._heat(s.heat_first)
-        spells, began = s.first, time.perf_counter()
+        spells, began, spell_s = s.first, time.perf_counter(), 0.0
         if np.isfinite(until) and spells > 0 and began < until:  # one spell tells how long they take
             desk.anneal(1, desk.size, s.proposals, (cold, cold), self._random)
             now = time.perf_counter()
-            spells = min(spells - 1, int((until - now) / max(now - began, 1e-6)))
+            spell_s = max(now - began, 1e-6)
+            spells = min(spells - 1, int((until - now) / spell_s))
         elif began >= until:
             spells = 0
+        self.hasty = spells < s.first - 1
         if spells > 0:
             count = max(1, min(s.starts, spells * s.proposals // (LEAST_PROPOSALS * desk.size)))
             desk.anneal_best(starts[:count], spells // count * s.proposals, (hot, cold), self._random)
         if spells > 0 and desk.lawnmowers:
-            keep_up(desk, desk.lawnmowers, self._heat(1.0), self._random, until)
+            keep_up(desk, desk.lawnmowers, self._heat(1.0), self._random, until, spell_s / s.proposals)
 
     def _ranked(self, belief: Belief) -> Ints:
         """The cells to look at, the best first, those about equally good in the order of a lawnmower: int [n].

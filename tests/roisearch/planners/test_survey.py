@@ -15,6 +15,7 @@ from roisearch import Belief, FieldOfView, Motion, SearchState, make_planner
 from roisearch.directions import direction_between, direction_index, moves_allowed
 from roisearch.planners.lanes import CORNERS, lawnmower, lawnmowers
 from roisearch.planners.ways import Ways
+from roisearch.watch import LOOKED
 
 MASKS = hnp.arrays(np.bool_, hnp.array_shapes(min_dims=2, max_dims=2, max_side=9))
 MOTION = Motion(cell_m=25.0)
@@ -107,3 +108,22 @@ def test_it_goes_back_to_what_is_reported_and_resumes() -> None:
     assert path.count(reported) == 3
     rest = path[14:]
     assert set(undisturbed[10:]) <= set(rest)
+
+
+def test_a_survey_that_takes_over_goes_on_where_the_last_one_stopped() -> None:
+    fov = FieldOfView.point(0.9, 0.99)
+    prior = np.ones((12, 12))
+    prior[:6] = 20.0  # where it is searched, more is left than where it is not
+    belief, rng, state = Belief(prior), np.random.default_rng(0), SearchState((0, 0), "east")
+    first = make_planner("survey", fov=fov, motion=MOTION)
+    for _ in range(70):
+        cell = first.plan(belief, state, rng).path[0]
+        state = SearchState(cell, direction_between(state.cell, cell))
+        belief.observe([cell], False, 0.9, 0.99)
+    seen, state = belief.follow(LOOKED).looked(), SearchState((0, 0), "east")
+    second, fresh = make_planner("survey", fov=fov, motion=MOTION), 0
+    for _ in range(70):
+        cell = second.plan(belief, state, rng).path[0]
+        fresh += not seen[cell[0] * 12 + cell[1]]
+        state = SearchState(cell, direction_between(state.cell, cell))
+    assert fresh > 50  # the rest is the way there

@@ -1,5 +1,6 @@
 """Cells over an area: what is searched, what is flown over, where the prior mass is."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -361,3 +362,10 @@ def test_same_file_gives_the_same_grid_to_the_last_bit() -> None:
     first, second = grid_of(*features), grid_of(*features)
     assert first.prior.tobytes() == second.prior.tobytes()
     assert first.frame == second.frame
+
+
+@pytest.mark.parametrize("exclusions", [(), [exclude(10, -190, 190, 190), exclude(-190, -190, -10, -10)]])
+def test_ground_of_a_single_cell_is_refused_with_what_helps(exclusions: Sequence[dict[str, Any]]) -> None:
+    cell_m = 200.0 if exclusions else 400.0
+    with pytest.raises(BadInput, match=r"no cell to fly over has another one beside it.*take smaller cells"):
+        grid_of(square(), *exclusions, cell_m=cell_m)

@@ -17,6 +17,7 @@ from service.mavlink.telemetry import Telemetry
 from service.mission.chart import Chart
 from service.mission.effects import SendWaypoint
 from service.mission.helm import Helm
+from service.mission.situation import Situation
 from sim.soak import ground
 from tests.service.mission.flown import GRID, ON_GROUND, START, place, telemetry
 
@@ -117,6 +118,14 @@ def test_two_sources_that_contradict_each_other_on_home_are_a_doubt() -> None:
         assert "above the sea" in built.doubts(contradiction, START)[0]
         wanted = waypoint(built, place(250.0, 60.0), contradiction, on_way=False)
         assert built.objection(wanted, contradiction, START) is not None
+
+
+def test_a_slow_aircraft_needs_more_of_its_battery_for_the_way_out_and_home() -> None:
+    built = helm(full_battery_s=250.0)
+    seen = Situation(telemetry(battery_percent=90.0))
+    assert built.too_empty(seen) == ""
+    slow = replace(seen, telemetry=replace(seen.telemetry, most_speed_mps=1.0))
+    assert "the way out and home needs about" in built.too_empty(slow)
 
 
 def test_a_home_far_from_the_launch_point_is_refused_and_one_beside_it_told() -> None:

@@ -169,3 +169,11 @@ def test_what_is_sent_is_always_a_straight_beginning_of_the_path(
     assert {direction_between(a, b) for a, b in zip([(50, 50), *sent], sent, strict=False)} == {n.heading}
     assert n.heading in DIRECTIONS
     assert leg == Leg((50, 50), n.waypoint, n.heading, len(sent))
+
+
+def test_a_weaker_braking_that_was_learnt_is_reckoned_with_and_a_harder_one_is_not() -> None:
+    n, set_m = navigator(), navigator().lead_m
+    n.learn(replace(n.motion, braking_mps2=0.5))
+    assert n.lead_m > set_m + 40.0
+    n.learn(replace(n.motion, braking_mps2=9.0))
+    assert n.lead_m == pytest.approx(set_m)

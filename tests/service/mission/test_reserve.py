@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from roisearch import Motion
 from service.area import build_grid, parse_area
 from service.config import FlightSettings
 from service.mavlink.telemetry import Home
@@ -13,8 +14,9 @@ from service.mission.chart import Chart
 from service.mission.effects import Tell
 from service.mission.reserve import Reserve
 from service.mission.states import State
+from service.reach import Reach
 from tests.service.area.files import at, box, collection, feature, point, polygon
-from tests.service.mission.flown import START, reached, telemetry
+from tests.service.mission.flown import CELL_M, GRID, START, Talk, reached, searching, telemetry
 
 EDGE = (10.0, 179.997)
 
@@ -45,3 +47,34 @@ def test_a_battery_that_tells_the_same_level_for_ever_leads_home_before_it_is_em
     assert talk.core.reserve.energy.percent is not None
     assert talk.core.reserve.energy.percent > 19.5
     assert [said for said in talk.wanted if isinstance(said, Tell) and "level stands still" in said.text]
+
+
+def home_s(talk: Talk) -> tuple[float, float]:
+    """Seconds across ground on the way home as the flight reckons it from where it is, and as the plan of the battery's
+    end does, on average over all cells."""
+    for percent in (89.0, 88.0, 87.0, 86.0):
+        talk.shows(battery_percent=percent)
+        talk.tick(10.0)
+    # what a decision is handed, without the wait for one
+    home, left = talk.core.reserve.energy.home, talk.core._look().battery_left()
+    assert left is not None
+    across = Reach(GRID, talk.settings.flight).home_s(left) - left.upright_s
+    return home.seconds - home.upright_s, float(across[GRID.flyable].mean())
+
+
+@pytest.mark.parametrize("how", ["its parameters say so", "it was learnt in flight"])
+def test_the_way_home_is_reckoned_at_no_speed_that_the_aircraft_cannot_fly(how: str) -> None:
+    as_asked, slow = searching(), searching()
+    if how.startswith("its"):
+        slow.shows(most_speed_mps=4.0)
+    else:
+        slow.sees(motion=Motion(cell_m=CELL_M, speed_mps=4.0))
+    for asked_s, slow_s in zip(home_s(as_asked), home_s(slow), strict=True):
+        assert slow_s > 1.4 * asked_s
+
+
+def test_a_faster_aircraft_flies_home_at_the_speed_that_is_asked() -> None:
+    talk = searching(most_speed_mps=20.0)
+    talk.sees(motion=Motion(cell_m=CELL_M, speed_mps=11.0))
+    talk.tick()
+    assert talk.core.reserve.energy.speed_mps == 8.0

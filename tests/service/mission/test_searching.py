@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from roisearch import Motion
 from service.evidence.found import Found
 from service.ground.relief import Relief
 from service.mavlink.events import Stalled
@@ -299,3 +300,18 @@ def test_a_climb_that_follows_another_at_once_is_over_when_the_aircraft_stands()
         assert Levelling(height, stands=True).done(still)
     assert not Levelling(climb, stands=False).done(telemetry(alt_amsl_m=430.0))
     assert not Levelling(sink, stands=False).done(telemetry(alt_amsl_m=450.0))
+
+
+def test_how_the_aircraft_brakes_is_flown_by_once_it_was_learnt() -> None:
+    """One that brakes weakly begins to, far before its waypoint: what comes after it is decided before that."""
+    talk = searching({"flight": {"altitude_m": 15.0, "deceleration_mps2": 3.0}})
+    (row, col), _ = talk.core.chart.cell(talk.seen.telemetry)
+    talk.tick()
+    talk.decides((row - 1, col), (row - 2, col), (row - 3, col))
+    talk.core.sent(legs(talk)[-1])
+    talk.done()
+    talk.tick()
+    asked = len(thoughts(talk))
+    talk.sees(motion=Motion(cell_m=20.0, braking_mps2=0.2))
+    talk.tick()
+    assert len(thoughts(talk)) == asked + 1

@@ -480,12 +480,14 @@ def test_without_a_journal_one_that_holds_blind_goes_home_once_it_sees_and_what_
 @pytest.mark.parametrize(
     ("another", "refused"),
     [
-        ({"home_amsl_m": 410.0}, True),
-        ({"home_amsl_m": 402.5}, False),
-        ({}, False),
-        ({"home_amsl_m": 410.0, "name": "9", "in_air": False}, False),  # whose take-off is refused then
-        ({"home_amsl_m": 410.0, "name": "9"}, True),
-        ({"home_amsl_m": 410.0, "ended": True, "in_air": False}, False),
+        ({"home_amsl_m": 410.0, "home": FAR}, True),
+        ({"home_amsl_m": 410.0}, False),  # side by side, and two receivers
+        ({"home_amsl_m": 402.5, "home": FAR}, False),
+        ({"home": FAR}, False),
+        # whose take-off is refused then
+        ({"home_amsl_m": 410.0, "home": FAR, "name": "9", "in_air": False}, False),
+        ({"home_amsl_m": 410.0, "home": FAR, "name": "9"}, True),
+        ({"home_amsl_m": 410.0, "home": FAR, "ended": True, "in_air": False}, False),
     ],
 )
 def test_without_a_ground_file_who_would_fly_at_anothers_height_does_not_take_off(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from roisearch import Belief, FieldOfView, Motion, SearchState
 from roisearch.directions import moves_allowed
 from roisearch.planners.tour import levels
 from roisearch.planners.tour.desk import Desk, prices_of
-from roisearch.planners.tour.levels import LATER, LEVELS, keep_up, times_to
+from roisearch.planners.tour.levels import LATER, LEVELS, PROPOSALS, keep_up, times_to
 from roisearch.planners.tour.planner import TourPlanner
 from roisearch.planners.tour.settings import TourSettings
 
@@ -30,8 +32,9 @@ def arranged(worth: NDArray[np.float64]) -> Desk:
     return desk
 
 
-def kept_up(desk: Desk, until: float = np.inf) -> bool:
-    return keep_up(desk, desk.lawnmowers, float(desk.prices.axis[0]), np.ones(1, dtype=np.uint64), until)
+def kept_up(desk: Desk, until: float = np.inf, proposal_s: float = 0.0) -> bool:
+    step_heat, random = float(desk.prices.axis[0]), np.ones(1, dtype=np.uint64)
+    return keep_up(desk, desk.lawnmowers, step_heat, random, until, proposal_s)
 
 
 def muddle(desk: Desk) -> NDArray[np.int64]:
@@ -70,6 +73,22 @@ def test_a_late_tour_stays(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(levels, "PAID", 0.01)
     assert not kept_up(desk, 0.0 if why == "there is no time" else np.inf)
     np.testing.assert_array_equal(desk.order(), order)
+
+
+def test_what_would_not_be_over_in_time_is_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    desk, begun = arranged(np.ones((SIDE, SIDE))), 0
+    muddle(desk)
+
+    def begin(*_: object) -> float:
+        nonlocal begun
+        begun += 1
+        return 0.0
+
+    monkeypatch.setattr(Desk, "anneal", begin)
+    kept_up(desk, time.perf_counter() + 30.0, proposal_s=31.0 / (PROPOSALS * desk.size))
+    assert not begun
+    kept_up(desk, time.perf_counter() + 30.0, proposal_s=1e-9)
+    assert begun
 
 
 def test_over_a_hill_the_tour_and_the_draws_stay_as_they_are() -> None:

@@ -323,8 +323,8 @@ class Intake:
                 observation = observe(self.passes, report.source, each.captured, reading)
             new[report.id] = (each, reading, observation)
             row = _row(report, each.pose, each.captured, observation)
-            body = as_json(of_aircraft(row, self.search.aircraft))
-            rows.append((self.clock.now(), row.kind, row.key, body))
+            key = f"{row.key} of {self.search.aircraft}" if self.search.aircraft else row.key
+            rows.append((self.clock.now(), row.kind, key, as_json(of_aircraft(row, self.search.aircraft))))
         return rows
 
     def _believe(self, each: WaitingReport, reading: Reading, observation: Observation | None) -> None:

@@ -380,14 +380,14 @@ def flight_left_s(mission: Mission, now: float) -> float | None:
 
 
 def pose_of(mission: Mission | None) -> FramePose | None:
-    """Where an aircraft is, metres above its launch; None while that is not known."""
+    """Where an aircraft is, metres above the launch point of the search; None while that is not known."""
     if mission is None or not mission.vehicle.telemetry.position_known:
         return None
     telemetry = mission.vehicle.telemetry
     return FramePose(
         telemetry.lat,
         telemetry.lon,
-        telemetry.alt_home_m,
+        telemetry.alt_home_m + mission.core.helm.heights.home_m,
         telemetry.heading_deg,
         telemetry.position_time,
         finite_or_level(telemetry.pitch_deg),

@@ -82,6 +82,23 @@ def test_the_same_report_sent_twice_at_once_is_counted_once(make: Callable[..., 
     assert intake.search.belief.probability()[3, 4] == pytest.approx(9 / (9 + 599))
 
 
+def test_detectors_of_two_aircraft_that_count_alike_are_not_taken_for_one(
+    make: Callable[..., Intake],
+) -> None:
+    sensor = Sensor(FRAME, FieldOfView.point(), 0.9, 0.9, 0.2, 0.8, 30.0)
+    first = make()
+    second = Intake(Ground(), sensor, first.journal, Moments(Clock()), lambda _: HERE, lambda *_: None)  # type: ignore[arg-type]
+    intakes = [first, second]
+    for name, intake in zip(("north", "south"), intakes, strict=True):
+        intake.search.aircraft = name
+
+    async def send() -> list[str]:
+        receipts = [await intake.submit(frame("cam0-1")) for intake in (*intakes, *intakes)]
+        return [receipt.status for receipt in receipts]
+
+    assert asyncio.run(send()) == ["accepted", "accepted", "duplicate", "duplicate"]
+
+
 def test_a_report_that_could_not_be_written_may_be_sent_again(make: Callable[..., Intake]) -> None:
     intake = make()
     with sqlite3.connect(intake.journal.path) as database:

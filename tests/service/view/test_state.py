@@ -93,10 +93,21 @@ def test_steps_are_cells_flown_in_a_replay_too(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("heading", [0.0, 350.0, math.nan])
 def test_a_heading_that_is_not_known_is_told_as_that_and_not_as_north(heading: float) -> None:
-    flying: Any = SimpleNamespace(vehicle=SimpleNamespace(telemetry=telemetry(heading_deg=heading)))
-    pose = pose_state(pose_of(flying), "degrees")
+    pose = pose_state(pose_of(stands(heading_deg=heading)), "degrees")
     assert pose is not None
     assert pose["heading_deg"] == (None if math.isnan(heading) else heading)
+
+
+def stands(home_m: float = 0.0, **told: float) -> Any:
+    """A mission whose home lies `home_m` above the launch point."""
+    core = SimpleNamespace(helm=SimpleNamespace(heights=SimpleNamespace(home_m=home_m)))
+    return SimpleNamespace(vehicle=SimpleNamespace(telemetry=telemetry(**told)), core=core)
+
+
+def test_a_live_height_is_over_the_launch_point_as_a_replays_is_wherever_home_lies() -> None:
+    pose = pose_of(stands(home_m=30.0, alt_home_m=15.0))
+    assert pose is not None
+    assert pose.height_m == 45.0
 
 
 def test_the_time_left_is_that_of_this_sortie_by_the_aircrafts_own_settings() -> None:

@@ -27,8 +27,10 @@ from roisearch.watch import LOOKED
 from service.errors import Parser
 from sim.bench_memory import table as memory_table
 from sim.bench_news import line as news_line
+from sim.bench_prompt import PROMPT, slowest_ms
 from sim.bench_regions import COST_AT_MOST, FEW, LOSS_AT_MOST, MANY, bounded_choice
 from sim.bench_start import table as start_table
+from sim.scenario import FIVE_HILLS, hills, scattered_hills
 from sim.twin import TwinBelief, TwinPlanner
 
 TWIN_AT_LEAST = 150.0
@@ -39,24 +41,6 @@ DEADLINE_MS = 38.0
 TOGETHER = 4
 CHUNK = 20
 PAPER: dict[str, Any] = {"preset": "paper", "commit": "never"}
-
-
-def hills(
-    shape: tuple[int, int], middles: list[tuple[float, float]], width: float = 8.0
-) -> NDArray[np.float64]:
-    """Equal Gaussian hills of `width` cells on a map of `shape`, summing to one."""
-    prior = np.zeros(shape)
-    for row, col in middles:
-        top, left = max(0, int(row - 12 * width)), max(0, int(col - 12 * width))
-        near = prior[top : int(row + 12 * width), left : int(col + 12 * width)]
-        down = np.arange(top, top + near.shape[0])[:, None] - row
-        right = np.arange(left, left + near.shape[1])[None, :] - col
-        near += np.exp(-(down**2 + right**2) / (2.0 * width**2))
-    prior /= prior.sum()
-    return prior
-
-
-FIVE_HILLS = [(60.0, 50.0), (40.0, 140.0), (110.0, 100.0), (160.0, 40.0), (150.0, 160.0)]
 
 
 @dataclass
@@ -248,7 +232,7 @@ def growths(largest: int, steps: int, say: Callable[[str], None]) -> list[Growth
         return fly(name, prior, steps, fov=point, regions=regions, **PAPER, iterations=count)
 
     def with_default(size: int) -> BenchFlight:
-        prior = hills((size, size), [(row * size / 200, col * size / 200) for row, col in FIVE_HILLS])
+        prior = scattered_hills(size)
         return fly(name, prior, max(CHUNK, steps // 10), fov=point, regions=segment_regions(prior))
 
     def made_anew(size: int) -> BenchFlight:
@@ -256,7 +240,7 @@ def growths(largest: int, steps: int, say: Callable[[str], None]) -> list[Growth
         return replan(name, np.outer(across, across), CHUNK, fov=point)
 
     def in_seconds(size: int) -> BenchFlight:
-        prior = hills((size, size), [(row * size / 200, col * size / 200) for row, col in FIVE_HILLS])
+        prior = scattered_hills(size)
         motion, nothing = Motion(cell_m=25.0), segment_regions(np.ones((2, 2)))
         count = max(CHUNK, steps // 10)
         return fly(name, prior, count, fov=point, regions=nothing, motion=motion, copies=True)
@@ -381,6 +365,12 @@ def main(arguments: list[str]) -> int:
     ratios = against_twin(options.steps, say)
     slowest = together(TOGETHER, options.steps, say)
     choice = bounded_choice(options.steps, say)
+    prompt = {side: slowest_ms(side, 20 * options.steps) for side in dict.fromkeys((200, options.largest))}
+    for side, took_ms in prompt.items():
+        say(
+            f"default planner with a motion and the service's deadline, {side} x {side}: {PROMPT:.1%} of "
+            f"{20 * options.steps} decisions took at most {took_ms:.1f} ms of the processor"
+        )
     found = growths(options.largest, 10 * options.steps, whisper)
     large, far, flown = (found[i].seconds[-1] / found[i].seconds[0] for i in (0, -2, -1))
     targets = [
@@ -392,6 +382,10 @@ def main(arguments: list[str]) -> int:
         (
             f"{MANY} regions cost at most x {COST_AT_MOST} a decision with {FEW}, and {LOSS_AT_MOST:.0%} of time",
             choice.cost <= COST_AT_MOST and choice.loss <= LOSS_AT_MOST,
+        ),
+        (
+            f"{PROMPT:.1%} of the decisions in flight within {DEADLINE_MS:.0f} ms",
+            max(prompt.values()) <= DEADLINE_MS,
         ),
         (f"a decision for each of {TOGETHER} searchers within {DEADLINE_MS:.0f} ms", slowest <= DEADLINE_MS),
     ]

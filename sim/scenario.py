@@ -61,3 +61,27 @@ def trail_prior(
     likely = np.exp(-0.5 * (nearest / width) ** 2).reshape(shape)
     normalised: NDArray[np.float64] = likely / likely.sum()
     return normalised
+
+
+def hills(
+    shape: tuple[int, int], middles: list[tuple[float, float]], width: float = 8.0
+) -> NDArray[np.float64]:
+    """Equal Gaussian hills of `width` cells on a map of `shape`, summing to one."""
+    prior = np.zeros(shape)
+    for row, col in middles:
+        top, left = max(0, int(row - 12 * width)), max(0, int(col - 12 * width))
+        near = prior[top : int(row + 12 * width), left : int(col + 12 * width)]
+        down = np.arange(top, top + near.shape[0])[:, None] - row
+        right = np.arange(left, left + near.shape[1])[None, :] - col
+        near += np.exp(-(down**2 + right**2) / (2.0 * width**2))
+    prior /= prior.sum()
+    return prior
+
+
+FIVE_HILLS = [(60.0, 50.0), (40.0, 140.0), (110.0, 100.0), (160.0, 40.0), (150.0, 160.0)]
+"""Where five hills stand on 200 x 200 cells."""
+
+
+def scattered_hills(side: int) -> NDArray[np.float64]:
+    """The same five hills, as wide as ever, as far apart as a map of `side` x `side` cells is large."""
+    return hills((side, side), [(row * side / 200, col * side / 200) for row, col in FIVE_HILLS])

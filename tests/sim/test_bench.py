@@ -18,6 +18,7 @@ def test_bench_prints_ratios_and_writes_table_and_plot(
     assert "times faster than its twin" in said
     assert "| 200 x 200 cells |" in said
     assert "| 1000 x 1000 cells |" not in said
+    assert "200 x 200: 99.9% of 400 decisions took at most" in said
     assert "news after 10000 observations: believing them anew" in said
     assert "| iterations |" in (tmp_path / "bench.md").read_text(encoding="utf-8")
     assert (tmp_path / "bench.png").read_bytes().startswith(b"\x89PNG")

@@ -256,13 +256,13 @@ class LookaheadPlanner:
                 self.pose = pose
                 return
             self._belief, touched = belief, [differing]
-        steps = self._steps_flown(pose)
+        steps = self._steps_flown(pose, touched)
         if steps > 0:
             before = tree.value[plans.EXPECTED]
             flown = plans.advance(steps, self.pose, tree, self.thinking.desk)
             self.thinking.flown(before - tree.value[plans.EXPECTED])
-            seen = self._seen(self.pose, steps)
-            touched = [*touched, *seen]
+            last = self._tree.mark[plans.NOW]
+            touched = [*touched, *self._looks(self.pose, self._tree.path[last - steps : last])]
             self.pose = flown
         lost = steps < 0 or self.pose != pose
         self.pose = pose
@@ -355,13 +355,12 @@ class LookaheadPlanner:
         self._tree.value[plans.UNDETECTED] = self._at_first
         self._tree.mark[:] = 0
 
-    def _steps_flown(self, pose: Pose) -> int:
+    def _steps_flown(self, pose: Pose, touched: Sequence[NDArray[np.int64]]) -> int:
         """How many steps of the plan were flown to get to `pose`; -1 when its cell is not on the plan.
 
-        A plan may enter a cell more than once within a few steps, so the one that ends with its heading is meant.
+        A plan may enter a cell more than once within a few steps, so the one that ends with its heading is meant; and
+        it may lead around to where it began, which it has when the looks of its first step are among those `touched`.
         """
-        if self.pose == pose:
-            return 0
         cols = self._chart.cols
         now, length = self._tree.mark[plans.NOW], self._tree.mark[plans.LENGTH]
         ahead = self._tree.path[now : min(length, now + 2 * self.settings.path)]
@@ -369,18 +368,23 @@ class LookaheadPlanner:
         before = np.where(found > 0, ahead[found - 1], self.pose.row * cols + self.pose.col)
         down, right = MOVES[pose.heading]
         as_told = found[before == (pose.row - down) * cols + pose.col - right]
+        stayed = (self.pose.row, self.pose.col) == (pose.row, pose.col)
+        if stayed and not (as_told.size and self._has_seen(ahead[:1], touched)):
+            return 0
         if as_told.size:
             return int(as_told[0]) + 1
-        if (self.pose.row, self.pose.col) == (pose.row, pose.col):
-            return 0
         return int(found[0]) + 1 if found.size else -1
 
-    def _seen(self, pose: Pose, steps: int) -> list[NDArray[np.int64]]:
-        """The cells that the last steps looked at."""
+    def _has_seen(self, ahead: NDArray[np.int64], touched: Sequence[NDArray[np.int64]]) -> bool:
+        """Whether all looks along the first cells of the plan are among those `touched`."""
+        looks = {tuple(cell) for part in self._looks(self.pose, ahead) for cell in part.tolist()}
+        return bool(touched) and looks <= {tuple(cell) for part in touched for cell in part.tolist()}
+
+    def _looks(self, pose: Pose, path: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+        """The cells looked at in each step along `path`, flat cells, from `pose`."""
         row, col = pose.row, pose.col
-        now = self._tree.mark[plans.NOW]
         seen = []
-        for flat in self._tree.path[now - steps : now].tolist():
+        for flat in path.tolist():
             to_row, to_col = divmod(flat, self._chart.cols)
             heading = (2 if to_row > row else 0) if to_row != row else (1 if to_col > col else 3)
             row, col = to_row, to_col

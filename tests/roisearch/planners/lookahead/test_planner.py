@@ -11,6 +11,7 @@ from roisearch import Belief, FieldOfView, SearchState, make_planner
 from roisearch.fov import HEADINGS, MOVES
 from roisearch.planners.lookahead.planner import LookaheadPlanner
 from roisearch.planners.lookahead.settings import LookaheadSettings
+from roisearch.planners.lookahead.sweeps import ANYWHERE
 from roisearch.planners.lookahead.thinking import Kept
 from roisearch.watch import LOOKED
 from sim.ruler import Ruler, detection_curve
@@ -331,3 +332,25 @@ def test_a_plan_that_comes_back_to_a_cell_within_a_few_steps_is_flown_on() -> No
         path = path[flown:]
         left = planner.committed()
         assert (left[: path.size] == np.stack(np.divmod(path, 30), axis=1)).all()
+
+
+@pytest.mark.parametrize("flown", [4, 0])
+def test_a_plan_that_leads_around_to_where_it_began_is_flown_on_once_it_was(flown: int) -> None:
+    """Two that searched together stood for ever at such a corner: what they had flown was not noticed."""
+    planner = LookaheadPlanner(LookaheadSettings(iterations=0, horizon=100), fov=FOVS["point"])
+    belief, rng, here = (
+        Belief(hill((30, 30), (15, 15), 4.0)),
+        np.random.default_rng(1),
+        SearchState((15, 15), "west"),
+    )
+    planner.plan(belief, here, rng)
+    around = [(14, 15), (14, 16), (15, 16), (15, 15), (14, 15), (13, 15)]
+    path = np.array([row * 30 + col for row, col in around] + [12 * 30 + 15, 13 * 30 + 15] * 47)
+    planner.take_up(Kept(path, np.full(path.size, ANYWHERE)))
+    planner.plan(belief, here, rng)
+    before = planner.committed()
+    if flown:
+        belief.observe(around[:4], False, 0.9, 1.0)
+    planner.plan(belief, here, rng)
+    after_it = planner.committed()
+    assert (after_it[0] == before[flown]).all()

@@ -11,7 +11,7 @@ interface Window {
 type Place = [number, number];
 type Colour = [number, number, number];
 
-type Growing = "track" | "hits" | "curve";
+type Growing = "hits" | "curve";
 /** What a moment may change. */
 type Changing = Growing | "belief" | "pod";
 
@@ -110,7 +110,10 @@ interface Moment {
   state: RunState;
   belief: BytesNews & { reference: number; log2_total: number };
   pod: BytesNews;
+  /** Of the only aircraft. */
   track?: RowsNews;
+  /** Of several, in the order of the state's `aircraft`. */
+  tracks?: (RowsNews | null)[];
   hits?: RowsNews;
   curve?: RowsNews;
 }

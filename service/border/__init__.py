@@ -16,7 +16,7 @@ What passes, over one socket, in frames of JSON whose size is bounded (`frames`)
     doors → flight   order      an operator's, checked; given as soon as it is read
                      reports    a few dozen at a time, checked, a few frames under way (`limits`); the receipt comes
                                 when they are on disk, as ever
-                     look       the state, the map, what is new of the track; at most a tenth of the flight's time
+                     look       the state, the map, what is new of the tracks; at most a tenth of the flight's time
                      metrics    what Prometheus is told
     flight → doors   one answer for each
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import logging
 import math
 import time
@@ -162,10 +163,14 @@ class Counter:
             if asked["moment"] or asked["arrays"]:
                 moment = self._run.moment()
                 answer |= {"state": moment.state, "total": moment.total}
+                since = asked["since"]
                 answer["rows"] = {
-                    name: _rows(getattr(moment, name), int(asked["since"][name]))
-                    for name in ("track", "hits", "curve")
+                    name: _rows(getattr(moment, name), int(since[name])) for name in ("hits", "curve")
                 }
+                known = itertools.chain(since["tracks"], itertools.repeat(0))
+                answer["tracks"] = [
+                    _rows(rows, int(count)) for rows, count in zip(moment.tracks, known, strict=False)
+                ]
                 if asked["arrays"]:
                     self._shared.write(moment.weights, moment.pod)
             else:

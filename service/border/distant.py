@@ -61,7 +61,8 @@ class DistantRun:
         self._outlining = asyncio.Lock()
         self._images = Images(journal.parent)
         self._wanted = _Wanted()
-        self._rows: dict[str, list[list[float]]] = {"track": [], "hits": [], "curve": []}
+        self._rows: dict[str, list[list[float]]] = {"hits": [], "curve": []}
+        self._tracks: list[list[list[float]]] = []
         nothing = cast(RunState, {})  # nobody is shown it: the first look brings another
         self._last = Moment(
             nothing, np.zeros(shared.shape[0] * shared.shape[1]), 1.0, np.zeros(shared.shape), [], [], []
@@ -155,12 +156,16 @@ class DistantRun:
     async def _look(self) -> _Look:
         wanted, self._wanted = self._wanted, _Wanted()
         since = {name: len(rows) for name, rows in self._rows.items()}
-        said = await self._asking.ask("look", LOOK_S, **vars(wanted), since=since)
+        known = {**since, "tracks": [len(rows) for rows in self._tracks]}
+        said = await self._asking.ask("look", LOOK_S, **vars(wanted), since=known)
         moment = replace(self._last, state=said["state"])
         if wanted.moment:
             for name, news in said["rows"].items():
                 self._rows[name][news["from"] :] = news["rows"]
-            moment = replace(moment, total=said["total"], **self._rows)  # type: ignore[arg-type]
+            self._tracks += [[] for _ in said["tracks"][len(self._tracks) :]]
+            for rows, news in zip(self._tracks, said["tracks"], strict=True):
+                rows[news["from"] :] = news["rows"]
+            moment = replace(moment, total=said["total"], tracks=self._tracks, **self._rows)  # type: ignore[arg-type]
         if wanted.arrays:
             weights, pod = self._shared.read()
             moment = replace(moment, weights=weights, pod=pod)

@@ -9,4 +9,4 @@ MOST_ORDERS = 64
 """As many as the door lets in: half of them only such that stop the aircraft."""
 MOST_NEWS = 4
 MOST_ROWS = 2000
-"""Of track, hits or curve in one answer; the rest comes with the next."""
+"""Of a track, hits or curve in one answer; the rest comes with the next."""

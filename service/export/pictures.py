@@ -31,7 +31,7 @@ def draw_maps(run: ExportedRun) -> tuple[bytes, bytes]:
         probability=run.poa,
         pod=run.pod,
         labels=run.labels,
-        track=[(fix.lat, fix.lon) for piece in run.track for fix in piece],
+        tracks=[[(fix.lat, fix.lon) for fix in piece] for piece in run.track],
         ahead=[],
         hits=run.hits,
         aircraft=(here.lat, here.lon) if here and not run.over else None,

@@ -20,7 +20,9 @@ EVENTS = """<section aria-labelledby="events"><h2 id="events"><code>WS /api/even
 <code>bearer.</code> followed by the command token in base64url; programs may send an <code>Authorization</code>
 header instead. The first message is the scene (area, grid, regions), every further one a moment, four times a
 second: the state, and of map, track, hits and POS curve what has changed. When the regions have been drawn again,
-<code>{"type": "regions", "regions": {...}, "names": [...], "drawn": 1}</code> comes before the moment.</p>
+<code>{"type": "regions", "regions": {...}, "names": [...], "drawn": 1}</code> comes before the moment. Of several
+aircraft <code>tracks</code> comes for <code>track</code>: a list with that of each, in the order of the state's
+<code>aircraft</code>, null where it is as it was.</p>
 <pre><code>{"type": "moment", "state": {"state": "SEARCHING", "pos": 0.31, ...},
  "belief": {"reference": 3, "log2_total": 0.0, "at": "base64, u32 cells", "codes": "base64, u8"},
  "pod": {"at": "...", "codes": "..."}, "track": {"from": 120, "rows": [[56.608, -4.742]]}}</code></pre>

@@ -4,7 +4,15 @@ import { COLOURS } from "./fleet.js";
 import { CRAFT, icon } from "./marks.js";
 
 const L = window.L;
-const STEP_M = 3; // so far from the last point of a track is the next one
+
+/** Draw what was flown. A track grows or is cut, so one that is as long as it was is the same.
+ * @param {any[]} lines
+ * @param {Place[]} track */
+export function drawTrack(lines, track) {
+  for (const line of lines) {
+    if (line.getLatLngs().length !== track.length) line.setLatLngs(track);
+  }
+}
 
 /** One aircraft's marks. */
 class Flyer {
@@ -39,21 +47,17 @@ class Flyer {
     flock.plans.addLayer(this.ahead);
   }
 
-  /** @param {AircraftState} craft */
-  draw({ lat, lon, heading_deg, ahead }) {
+  /** @param {AircraftState} craft
+   * @param {Place[]} track */
+  draw({ lat, lon, heading_deg, ahead }, track) {
+    drawTrack([this.casing, this.track], track);
     this.ahead.setLatLngs(ahead);
     if (lat === null || lon === null) {
       this.mark.remove();
       this.name.remove();
       return;
     }
-    const place = [lat, lon],
-      points = this.track.getLatLngs(),
-      last = points.at(-1);
-    if (!last || this.flock.map.distance(last, place) >= STEP_M) {
-      this.track.addLatLng(place);
-      this.casing.addLatLng(place);
-    }
+    const place = [lat, lon];
     this.mark.setLatLng(place).addTo(this.flock.map);
     this.name.setLatLng(place).addTo(this.flock.map);
     const turned = this.mark.getElement().querySelector("g");
@@ -68,11 +72,10 @@ class Flyer {
   }
 }
 
-/** All of them. A track is what this page has seen flown; in a replay it begins anew when time is set back. */
+/** All of them. */
 export class Flock {
   /** By name. @type {Map<string, Flyer>} */
   flyers = new Map();
-  time = -Infinity;
 
   /** `tracks` and `plans`: the layers that show what was flown and the way ahead.
    * @param {any} map
@@ -85,20 +88,18 @@ export class Flock {
   }
 
   /** @param {AircraftState[]} fleet none: there is only one aircraft, which is drawn elsewhere
-   * @param {number} time */
-  draw(fleet, time) {
+   * @param {Place[][]} tracks of each, as far as there is one */
+  draw(fleet, tracks) {
     const names = fleet.map(({ name }) => name);
-    const back = time < this.time;
-    this.time = time;
     for (const [name, flyer] of this.flyers) {
-      if (!back && names.includes(name)) continue;
+      if (names.includes(name)) continue;
       flyer.remove();
       this.flyers.delete(name);
     }
-    for (const craft of fleet) {
+    fleet.forEach((craft, number) => {
       let flyer = this.flyers.get(craft.name);
       if (!flyer) this.flyers.set(craft.name, (flyer = new Flyer(this, craft)));
-      flyer.draw(craft);
-    }
+      flyer.draw(craft, tracks[number] ?? []);
+    });
   }
 }

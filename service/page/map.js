@@ -2,7 +2,7 @@
 
 import { Cells, heatColours, percent, podColours, scaleOf } from "./cells.js";
 import { several } from "./fleet.js";
-import { Flock } from "./flock.js";
+import { drawTrack, Flock } from "./flock.js";
 import { CRAFT, ellipse, FOUND, icon, LAUNCH, nameMark, placeNorth, SUSPECT } from "./marks.js";
 import { onTheme } from "./themes.js";
 import { OwnTiles } from "./tiles.js";
@@ -312,21 +312,18 @@ export class Chart {
       if (span && span.textContent !== said) span.textContent = said;
     }
     this.drawNews(state.news);
-    this.drawFlight(state, changed.has("track"));
+    this.drawFlight(state);
     this.drawPlaces(state);
   }
 
   /** Who flies: several in their colours, or the one.
-   * @param {RunState} state
-   * @param {boolean} flown whether there is more of the track */
-  drawFlight(state, flown) {
-    const fleet = several(state) ? state.aircraft : [];
-    this.flock.draw(fleet, state.time);
+   * @param {RunState} state */
+  drawFlight(state) {
+    const fleet = several(state) ? state.aircraft : [],
+      { tracks } = this.run;
+    this.flock.draw(fleet, tracks);
+    drawTrack([this.trackLine, this.trackTop], fleet.length ? [] : (tracks[0] ?? []));
     this.drawWay(fleet.length ? [] : (state.ahead ?? []));
-    if (flown) {
-      const track = fleet.length ? [] : this.run.track;
-      for (const line of [this.trackLine, this.trackTop]) line.setLatLngs(track);
-    }
     this.drawCraft(state, fleet);
   }
 

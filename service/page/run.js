@@ -4,7 +4,15 @@
 const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
 /** @type {Growing[]} */
-const GROWING = ["track", "hits", "curve"];
+const GROWING = ["hits", "curve"];
+
+/** Cut a list where its news begin, and append them.
+ * @param {Place[]} list
+ * @param {RowsNews} news */
+function renew(list, { from, rows }) {
+  list.length = from;
+  for (const row of rows) list.push(row);
+}
 
 export class Run {
   /** @param {Scene} scene */
@@ -15,8 +23,8 @@ export class Run {
     this.pod = new Uint8Array(cells); // in 255ths
     this.reference = 0;
     this.log2Total = 0;
-    /** Positions flown. @type {Place[]} */
-    this.track = [];
+    /** Positions flown, of each aircraft. @type {Place[][]} */
+    this.tracks = [];
     /** Positions of hits. @type {Place[]} */
     this.hits = [];
     /** Seconds and POS. @type {Place[]} */
@@ -42,10 +50,12 @@ export class Run {
     for (const name of GROWING) {
       const news = moment[name];
       if (!news) continue;
-      this[name].length = news.from;
-      for (const row of news.rows) this[name].push(row);
+      renew(this[name], news);
       changed.add(name);
     }
+    (moment.tracks ?? [moment.track]).forEach((news, number) => {
+      if (news) renew((this.tracks[number] ??= []), news);
+    });
     return changed;
   }
 

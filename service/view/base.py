@@ -90,8 +90,8 @@ class BaseView:
         """Where the search stands."""
         raise NotImplementedError
 
-    def track(self) -> Sequence[LatLon]:
-        """Where the aircraft was, one position a second."""
+    def tracks(self) -> Sequence[Sequence[LatLon]]:
+        """Where each aircraft was, one position a second."""
         raise NotImplementedError
 
     def hits(self) -> Sequence[LatLon]:
@@ -203,7 +203,7 @@ class BaseView:
             weights=belief.weights,
             total=belief.total,
             pod=self.search.record.pod(),
-            track=self.track(),
+            tracks=self.tracks(),
             hits=self.hits(),
             curve=(),
         )

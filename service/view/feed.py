@@ -31,22 +31,23 @@ class Moment:
         state: the state as `/api/state` tells it.
         weights: the belief's unnormalised weights, float [cells], and `total` what to divide them by.
         pod: cumulative probability of detection, float [rows, cols].
-        track, hits, curve: lists that only grow from moment to moment, unless time is set back.
+        tracks: where each aircraft was, in the order of the state's `aircraft`.
+        hits, curve: as the lists in `tracks`, they only grow from moment to moment, unless time is set back.
     """
 
     state: RunState
     weights: NDArray[np.float64]
     total: float
     pod: NDArray[np.float64]
-    track: Sequence[Sequence[float]]
+    tracks: Sequence[Sequence[Sequence[float]]]
     hits: Sequence[Sequence[float]]
     curve: Sequence[Sequence[float]]
 
     def copied(self) -> Moment:
         """This moment with arrays and lists of its own, to be looked at while the search goes on."""
-        track, hits, curve = list(self.track), list(self.hits), list(self.curve)
+        tracks, hits, curve = [list(each) for each in self.tracks], list(self.hits), list(self.curve)
         weights, pod = self.weights.copy(), self.pod.copy()
-        return replace(self, weights=weights, pod=pod, track=track, hits=hits, curve=curve)
+        return replace(self, weights=weights, pod=pod, tracks=tracks, hits=hits, curve=curve)
 
 
 @dataclass
@@ -65,7 +66,10 @@ class Feed:
         said: dict[str, Any] = {"type": "moment", "state": moment.state}
         said["belief"] = {**self._belief_news(moment), "log2_total": math.log2(moment.total)}
         said["pod"] = self._pod.news(np.rint(255.0 * moment.pod.ravel()).astype(np.uint8))
-        for name, rows in (("track", moment.track), ("hits", moment.hits), ("curve", moment.curve)):
+        tracks = [self._more(f"track {number}", rows) for number, rows in enumerate(moment.tracks)]
+        if any(tracks):
+            said |= {"track": tracks[0]} if len(tracks) == 1 else {"tracks": tracks}
+        for name, rows in (("hits", moment.hits), ("curve", moment.curve)):
             news = self._more(name, rows)
             if news is not None:
                 said[name] = news

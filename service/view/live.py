@@ -307,18 +307,14 @@ class RunView(BaseView):
         wind = self.mission.core.reserve.wind if self.mission else None
         return None if wind is None else wind_state(wind.north_mps, wind.east_mps)
 
-    def track(self) -> list[LatLon]:
-        """Where the aircraft was, one position a second."""
-        return [(lat, lon) for _, lat, lon, _ in self._first.flight.track] if self._first else []
+    def tracks(self) -> list[list[LatLon]]:
+        """Where each aircraft was, one position a second."""
+        missions = self.squad.missions.values() if self.squad else ()
+        return [[(lat, lon) for _, lat, lon, _ in each.flight.track] for each in missions]
 
     def hits(self) -> list[LatLon]:
         """Where the detectors reported the target: such lists only grow."""
         return self.squad.hits if self.squad else []
-
-    @property
-    def _first(self) -> Mission | None:
-        """The first mission, whether it has ended or not."""
-        return next(iter(self.squad.missions.values())) if self.squad else None
 
     def _reports(self) -> ReportsState:
         intake = self.mission.intake if self.mission else None

@@ -45,7 +45,7 @@ def map_text(ground: SearchGround, moment: Moment, digest: str) -> bytes:
 
 
 def geojson_text(ground: SearchGround, moment: Moment) -> bytes:
-    """The map for other programs (RFC 7946): area, regions with their mass, cells, track, hits, the place found."""
+    """The map for other programs (RFC 7946): area, regions with their mass, cells, tracks, hits, the place found."""
     state = moment.state
     members = {name: _said(state[name]) for name in ("pos", "outside", "time")}
     features = ",".join(_said(each) for each in _features(ground, moment))
@@ -66,8 +66,10 @@ def _features(ground: SearchGround, moment: Moment) -> Iterator[dict[str, Any]]:
     probability, cells = _probability(ground, moment), np.argwhere(grid.searchable)
     for start in range(0, len(cells), _CELLS_AT_ONCE):
         yield from cell_features(grid, probability, moment.pod, cells[start : start + _CELLS_AT_ONCE])
-    if len(moment.track) > 1:
-        yield feature(line(moment.track), "track")
+    for number, track in enumerate(moment.tracks):
+        if len(track) > 1:
+            whose = {"aircraft": state["aircraft"][number]["name"]} if len(moment.tracks) > 1 else {}
+            yield feature(line(track), "track", **whose)
     for hit in moment.hits:
         yield feature(point(hit[0], hit[1]), "hit")
     if found := state["found"]:
@@ -90,7 +92,7 @@ def draw_map(ground: SearchGround, moment: Moment) -> bytes:
             probability=_probability(ground, moment),
             pod=moment.pod,
             labels=ground.labels,
-            track=_places(moment.track),
+            tracks=[_places(each) for each in moment.tracks],
             ahead=_places(state["ahead"]),
             hits=_places(moment.hits),
             aircraft=(pose["lat"], pose["lon"]) if pose else None,

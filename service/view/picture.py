@@ -27,7 +27,7 @@ class PictureScene:
     probability: NDArray[np.float64]
     pod: NDArray[np.float64]
     labels: NDArray[np.integer[Any]]
-    track: Sequence[LatLon]
+    tracks: Sequence[Sequence[LatLon]]
     ahead: Sequence[LatLon]
     hits: Sequence[LatLon]
     aircraft: LatLon | None
@@ -89,11 +89,12 @@ def _bar(axes: Axes, image: Any, label: str) -> None:
 
 
 def _finish(sheet: Sheet, scene: PictureScene) -> None:
-    """Regions, track, hits, aircraft, the place found, and what every map has."""
+    """Regions, tracks, hits, aircraft, the place found, and what every map has."""
     blocked = np.where(scene.grid.flyable, np.nan, 1.0)
     sheet.cells(blocked, cmap="Greys", vmin=0.0, vmax=1.6, alpha=0.35)
     sheet.regions(scene.labels, scene.names)
-    sheet.line(scene.track, "-", color=TRACK, lw=0.9, alpha=0.8, label="track")
+    for number, track in enumerate(each for each in scene.tracks if each):
+        sheet.line(track, "-", color=TRACK, lw=0.9, alpha=0.8, label="" if number else "track")
     sheet.line(scene.ahead, "--", color="#5b2a91", lw=1.4, label="decided")
     sheet.line(scene.hits, "x", color="#b00020", ms=6, mew=1.6, label="hits")
     if scene.aircraft is not None:

@@ -39,12 +39,12 @@ AFTER_RESTART_S = 0.1
 @dataclass(frozen=True)
 class _Told:
     """What the journal has told up to a row, by the names of aircraft; lists only grow, so a time is a length of each.
-    `track` is that of the first aircraft."""
+    `tracks` has that of each flight."""
 
     flights: dict[str, FlightSoFar]
     leading: FlightSoFar
     found: Found | None
-    track: int
+    tracks: tuple[int, ...]
     hits: int
     curve: int
 
@@ -114,7 +114,8 @@ class ReplayView(BaseView):
                 stories.take(replace(entry, time=time), frame)
             if isinstance(entry.said, ReportRow) and entry.said.observation is not None:
                 self._curve.add(time, self.search.record.pos)
-            lengths = len(_first(stories.flights).track), len(stories.hits), len(self._curve.points)
+            tracks = tuple(len(each.track) for each in stories.flights.values())
+            lengths = tracks, len(stories.hits), len(self._curve.points)
             self._told.append(_Told(dict(stories.flights), stories.leading, stories.found, *lengths))
         self._hits = stories.hits
 
@@ -204,10 +205,13 @@ class ReplayView(BaseView):
             "footprint": self.footprint(pose, name),
         }
 
-    def track(self) -> list[LatLon]:
-        """Where the aircraft was when it reported, one position a second."""
+    def tracks(self) -> list[list[LatLon]]:
+        """Where each aircraft was when it reported, one position a second."""
         told = self._told[self._at - 1]
-        return [(lat, lon) for _, lat, lon, _ in _first(told.flights).track[: told.track]]
+        return [
+            [(lat, lon) for _, lat, lon, _ in flight.track[:length]]
+            for flight, length in zip(told.flights.values(), told.tracks, strict=True)
+        ]
 
     def hits(self) -> list[LatLon]:
         """Where the detector reported the target."""
@@ -226,10 +230,6 @@ class ReplayView(BaseView):
             if isinstance(entry.said, DecisionRow)
         ]
         return made[::-1][:count]
-
-
-def _first(flights: dict[str, FlightSoFar]) -> FlightSoFar:
-    return next(iter(flights.values()))
 
 
 def monotone(times: list[float]) -> list[float]:

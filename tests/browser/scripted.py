@@ -67,6 +67,7 @@ class Scripted(FakeRun):
         self.redrawn: dict[str, Any] = {}
         self.ordered: list[tuple[str, str | None]] = []
         self.systems: list[int | None] = []
+        self.tracks: list[list[LatLon]] = [[(56.6072, -4.7422), (56.6076, -4.7421), (56.6081, -4.7421)]]
         self.now = copy.deepcopy(self.view.state())
         here = {"lat": 56.6081, "lon": -4.7421, "height_m": 40.0, "heading_deg": 70.0}
         still = {"time": 0.0, "pitch_deg": 0.0, "roll_deg": 0.0, "written": self.written((56.6081, -4.7421))}
@@ -118,10 +119,8 @@ class Scripted(FakeRun):
     async def moment(self) -> Moment:
         belief = self.search.belief
         pod = np.where(np.arange(belief.weights.size).reshape(belief.weights.shape) % 3 == 0, 0.8, 0.0)
-        track = [(56.6072, -4.7422), (56.6076, -4.7421), (56.6081, -4.7421)]
-        return Moment(
-            self.now, belief.weights, belief.total, pod, track, [PHONE_FIX], [(0.0, 0.0), (60.0, 0.21)]
-        )
+        hits, curve = [PHONE_FIX], [(0.0, 0.0), (60.0, 0.21)]
+        return Moment(self.now, belief.weights, belief.total, pod, self.tracks, hits, curve)
 
     async def regions(self) -> dict[str, Any]:
         return {**self.view.ground.described_regions(), **self.redrawn}

@@ -13,6 +13,8 @@ from playwright.sync_api import Browser, Locator, expect
 from service.evidence.reports import OrderReceipt
 from service.mission.states import State
 from service.view.next import STATE_WORDS
+from tests.integration.flight import running
+from tests.service.export.recorded import record_two
 from tests.service.http.door import REPORT, both_tokens
 from tests.service.test_squad import in_the_air_and_on_the_ground
 
@@ -21,6 +23,9 @@ from .scripted import PHONE_FIX, RUIN, Scripted, Served, orders, served
 from .stage import Watch
 
 pytestmark = pytest.mark.timeout(300)
+NOTHING = "M0 0"
+"""A line without a place, as Leaflet draws it."""
+THREE_PLACES = re.compile(r"^M[^ML]+L[^ML]+L[^ML]+$")
 PLACES = [(56.6081, -4.7421), (56.6090, -4.7400), (56.6099, -4.7436)]
 
 
@@ -40,13 +45,14 @@ def craft(search: Scripted, number: int, state: State, **changes: Any) -> dict[s
 
 
 def fly_three(search: Scripted, **third: Any) -> None:
-    """Two that search and one that holds."""
+    """Two that search and one that holds, each of which has flown a corner."""
     three = [
         craft(search, 1, State.SEARCHING),
         craft(search, 2, State.SEARCHING, battery=19.0),
         craft(search, 3, State.HOLDING, **third),
     ]
     search.tell(aircraft=three)
+    search.tracks = [[(lat - 0.0006, lon), (lat - 0.0003, lon + 0.0006), (lat, lon)] for lat, lon in PLACES]
 
 
 @pytest.fixture
@@ -64,6 +70,11 @@ def watch(chromium: Browser, search: Served) -> Iterator[Watch]:
     page.shows("SEARCHING")
     yield page
     page.close()
+
+
+def flown(watch: Watch, number: int) -> Locator:
+    """The line of what an aircraft has flown."""
+    return watch.page.locator(f"#map path.own-{number - 1}:not([stroke-dasharray])")
 
 
 def panel(watch: Watch, name: str) -> Locator:
@@ -190,16 +201,44 @@ def test_each_is_on_the_map_in_its_colour_with_its_name_its_track_and_its_plan(
         "(all) => all.map((each) => getComputedStyle(each).backgroundColor)"
     )
     assert marks == swatches
-    track = page.locator("#map path.own-1:not([stroke-dasharray])")
-    before = track.get_attribute("d")
-    moved = [
-        craft(search.run, number, State.SEARCHING, lat=PLACES[number - 1][0] + 0.0004) for number in (1, 2, 3)
-    ]
-    search.run.tell(aircraft=moved)
-    expect(track).not_to_have_attribute("d", before or "")
+    before = flown(watch, 2).get_attribute("d") or ""
+    assert before.count("L") == 2
+    search.run.tracks[1].append((PLACES[1][0] + 0.0004, PLACES[1][1]))
+    expect(flown(watch, 2)).to_have_attribute("d", re.compile(f"{before}L"))
+    assert [(flown(watch, number).get_attribute("d") or "").count("L") for number in (1, 3)] == [2, 2]
     assert not watch.violations()
     if pictures is not None:
         page.screenshot(path=pictures / "fleet.png")
+
+
+def test_a_page_that_is_loaded_again_shows_all_that_each_has_flown(watch: Watch, search: Served) -> None:
+    for number in (1, 2, 3):
+        expect(flown(watch, number)).to_have_attribute("d", THREE_PLACES)
+    watch.page.reload()
+    watch.shows("SEARCHING")
+    for number in (1, 2, 3):
+        expect(flown(watch, number)).to_have_attribute("d", THREE_PLACES)
+
+
+def test_a_replay_shows_the_track_of_each_at_its_end_and_as_far_as_it_was_before(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    folder = record_two(tmp_path)
+    with running("service", "replay", str(folder), "--http", "127.0.0.1:0") as service:
+        watch = Watch(chromium, service.wait_for(r"listening on (http://\S+)").group(1))
+        watch.shows("SEARCHING")
+        slider = watch.page.get_by_role("slider", name="Time")
+        ends = [flown(watch, number).get_attribute("d") or "" for number in (1, 2)]
+        assert all("L" in end for end in ends)
+        slider.fill("7")  # the first has looked at its cells, the second has not begun
+        expect(flown(watch, 2)).to_have_attribute("d", NOTHING)
+        expect(flown(watch, 1)).to_have_attribute("d", ends[0])
+        slider.fill("1")
+        expect(flown(watch, 1)).to_have_attribute("d", NOTHING)
+        slider.fill("12")
+        for number in (1, 2):
+            expect(flown(watch, number)).to_have_attribute("d", ends[number - 1])
+        watch.close()
 
 
 def test_a_search_with_one_aircraft_has_no_panels_and_the_old_orders(watch: Watch, search: Served) -> None:

@@ -58,7 +58,7 @@ class Flown:
         self.looks = 0
         self.fault: Exception | None = None
         self.weights = self.ground.grid.prior.ravel().copy()
-        self.track: list[tuple[float, float]] = []
+        self.tracks: list[list[tuple[float, float]]] = [[]]
 
     def state(self) -> dict[str, Any]:
         self.looks += 1
@@ -76,11 +76,12 @@ class Flown:
             "news": [],
             "steps": 3,
             "flight_time_s": 4.0,
+            "aircraft": [{"name": f"drone {number}"} for number in range(1, len(self.tracks) + 1)],
         }
 
     def moment(self) -> Moment:
         pod = np.zeros(self.ground.grid.frame.shape)
-        return Moment(self.state(), self.weights, 1.0, pod, self.track, [], [(0.0, 0.0)])
+        return Moment(self.state(), self.weights, 1.0, pod, self.tracks, [], [(0.0, 0.0)])
 
     def fingerprint(self) -> Callable[[], str]:
         return lambda: "a digest"

@@ -146,18 +146,47 @@ def test_the_map_passes_to_the_last_bit_and_only_what_is_new_of_the_track(tmp_pa
             )
             assert told["digest"] == "a digest"
             run.weights[run.weights > 0.0] *= 0.5
-            run.track += [(47.0, 8.0), (47.1, 8.1)]
+            run.tracks[0] += [(47.0, 8.0), (47.1, 8.1)]
             cells = (await client.get("/api/map?format=geojson")).json()["features"]
             track = [each for each in cells if each["properties"]["role"] == "track"]
             assert track[0]["geometry"]["coordinates"] == [[8.0, 47.0], [8.1, 47.1]]
+            assert track[0]["properties"] == {"role": "track"}
             masses = [c["properties"]["probability"] for c in cells if c["properties"]["role"] == "cell"]
             assert sum(masses) == pytest.approx(0.5)
-            run.track.append((47.2, 8.2))
+            run.tracks[0].append((47.2, 8.2))
             url = str(client.base_url).replace("http", "ws").rstrip("/")
             async with connect(f"{url}/api/events") as watcher:
                 assert json.loads(await watcher.recv())["type"] == "scene"
                 moment = json.loads(await watcher.recv())
                 assert moment["track"] == {"from": 0, "rows": [[47.0, 8.0], [47.1, 8.1], [47.2, 8.2]]}
+                assert "tracks" not in moment
+
+    asyncio.run(talk())
+
+
+def test_the_tracks_of_all_aircraft_pass_and_of_each_only_what_is_new(tmp_path: Path) -> None:
+    run = Flown()
+    run.tracks = [[(47.0, 8.0), (47.1, 8.1)], [(46.0, 8.0), (46.1, 8.1), (46.2, 8.2)]]
+
+    async def talk() -> None:
+        async with behind_a_door(run, tmp_path) as client:
+            url = str(client.base_url).replace("http", "ws").rstrip("/")
+            async with connect(f"{url}/api/events") as watcher:
+                assert json.loads(await watcher.recv())["type"] == "scene"
+                moment = json.loads(await watcher.recv())
+                assert "track" not in moment
+                assert moment["tracks"] == [
+                    {"from": 0, "rows": [[47.0, 8.0], [47.1, 8.1]]},
+                    {"from": 0, "rows": [[46.0, 8.0], [46.1, 8.1], [46.2, 8.2]]},
+                ]
+                run.tracks[1].append((46.3, 8.3))
+                while "tracks" not in (moment := json.loads(await watcher.recv())):
+                    pass
+                assert moment["tracks"] == [None, {"from": 3, "rows": [[46.3, 8.3]]}]
+            cells = (await client.get("/api/map?format=geojson")).json()["features"]
+            lines = [each for each in cells if each["properties"]["role"] == "track"]
+            assert [each["properties"]["aircraft"] for each in lines] == ["drone 1", "drone 2"]
+            assert [len(each["geometry"]["coordinates"]) for each in lines] == [2, 4]
 
     asyncio.run(talk())
 

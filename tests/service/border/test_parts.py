@@ -213,6 +213,24 @@ def test_nothing_unchecked_reaches_the_flight(message: dict[str, Any]) -> None:
     assert run.reports == []
 
 
+def test_a_look_brings_what_is_new_of_each_track_and_all_of_one_that_was_not_known() -> None:
+    run = Flown()
+    run.tracks = [[(47.0 + i, 8.0) for i in range(4)], [(46.0, 8.0)], [(45.0, 8.0), (45.1, 8.0)]]
+
+    async def once() -> dict[str, Any]:
+        taking, said = counter(run)
+        since = {"tracks": [3, 1], "hits": 0, "curve": 1}
+        taking.take({"ask": 1, **LOOK, "moment": True, "since": since})
+        await answers(said, 1)
+        return said[0]
+
+    assert asyncio.run(once())["tracks"] == [
+        {"from": 3, "rows": [[50.0, 8.0]]},
+        {"from": 1, "rows": []},
+        {"from": 0, "rows": [[45.0, 8.0], [45.1, 8.0]]},
+    ]
+
+
 def test_looking_takes_no_more_than_its_share_of_the_flights_time() -> None:
     class Costly(Flown):
         spent = 0.0

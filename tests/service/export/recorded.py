@@ -126,3 +126,18 @@ def record(folder: Path, *, found: bool = False, part: float = 0.5) -> Path:
         recorder.look(cell, hit=number == 5, detections=seen if number in (5, 6) else ())
     recorder.end(found=found)
     return folder
+
+
+def record_two(folder: Path) -> Path:
+    """A run of two: kite looks at four cells, and then crow at three others."""
+    recorder = Recorder(folder)
+    tables = [{"name": "kite"}, {"name": "crow"}]
+    recorder.journal.set_meta("settings", {**SETTINGS.model_dump(), "aircraft": tables})
+    cells = list(recorder.cells())
+    for name, seen in (("kite", cells[:4]), ("crow", cells[20:23])):
+        recorder.aircraft = {"aircraft": name}
+        recorder.start()
+        for cell in seen:
+            recorder.look(cell)
+    recorder.journal.close()
+    return folder

@@ -9,6 +9,7 @@ import shapely
 
 from service.news.request import NewsRequest
 from service.rows import NewsRow, ReportRow, SortieRow, WithdrawnRow
+from service.view.feed import Feed
 from service.view.maps import geojson_text
 from service.view.replay import ReplayView
 from tests.service.area.files import box, polygon
@@ -34,7 +35,7 @@ def test_a_replay_tells_of_reports_track_and_what_was_found(tmp_path: Path) -> N
     view = ReplayView(record(tmp_path / "run", found=True))
     reports = [entry for entry in view.rows if isinstance(entry.said, ReportRow)]
     state = view.state()
-    assert state["reports"]["accepted"] == len(reports) == len(view.track())
+    assert state["reports"]["accepted"] == len(reports) == len(view.tracks()[0])
     assert state["found"]["probability"] == 0.9994
     assert state["state"] == "DONE"
 
@@ -44,12 +45,13 @@ def test_a_replay_knows_each_of_several_aircraft(tmp_path: Path) -> None:
     recorder.journal.set_meta(
         "settings", {**SETTINGS.model_dump(), "aircraft": [{"name": "kite"}, {"name": "crow"}]}
     )
-    cells = list(recorder.cells())
+    cells, heard = list(recorder.cells()), []
     for name, seen in (("kite", cells[:3]), ("crow", cells[3:5])):
         recorder.aircraft = {"aircraft": name}
         recorder.start()
         for cell in seen:
             recorder.look(cell, hit=cell == cells[4])
+            heard.append(recorder.time)
     recorder.aircraft = {"aircraft": "kite"}
     recorder.write("transition", **{"from": "SEARCHING", "event": "hold", "to": "HOLDING", "reason": "test"})
     for name in ("kite", "crow"):
@@ -68,8 +70,21 @@ def test_a_replay_knows_each_of_several_aircraft(tmp_path: Path) -> None:
     assert own == [[("kite", 1, "battery of kite")], [("crow", 1, "battery of crow")]]
     where = recorder.grid.frame.to_latlon([cells[2], cells[4]]).tolist()
     assert [[kite["lat"], kite["lon"]], [crow["lat"], crow["lon"]]] == where
-    assert (len(view.track()), len(view.hits()), view.state()["reports"]["accepted"]) == (3, 1, 5)
+    flown = recorder.grid.frame.to_latlon(cells[:5]).tolist()
+    assert [[list(place) for place in track] for track in view.tracks()] == [flown[:3], flown[3:]]
+    assert (len(view.hits()), view.state()["reports"]["accepted"]) == (1, 5)
+    shown = json.loads(geojson_text(view.ground, view.moment()))["features"]
+    tracks = [each for each in shown if each["properties"]["role"] == "track"]
+    assert [each["properties"]["aircraft"] for each in tracks] == ["kite", "crow"]
+    assert [len(each["geometry"]["coordinates"]) for each in tracks] == [3, 2]
+    feed = Feed(view.search.grid.searchable)
+    whole = feed.message(view.moment())["tracks"]
+    assert [(news["from"], len(news["rows"])) for news in whole] == [(0, 3), (0, 2)]
+    view.seek(heard[3])
+    assert [len(track) for track in view.tracks()] == [3, 1]
+    assert feed.message(view.moment())["tracks"] == [None, {"from": 1, "rows": []}]
     view.seek(view.span()[0])
+    assert view.tracks() == [[], []]
     assert [each["state"] for each in view.state()["aircraft"]] == ["READY", "WAITING"]
     assert view.hits() == []
 

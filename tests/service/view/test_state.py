@@ -91,6 +91,22 @@ def test_steps_are_cells_flown_in_a_replay_too(tmp_path: Path) -> None:
     assert view.state()["steps"] < len(flown)
 
 
+def test_a_live_view_has_the_tracks_of_all_in_their_order_and_of_none_before_they_are_heard(
+    tmp_path: Path,
+) -> None:
+    record(tmp_path / "run")
+    area, grid = survey(tmp_path / "run" / AREA, None, SETTINGS)
+    view = RunView(area, Search(grid, SETTINGS), sensors_over(grid, SETTINGS), SETTINGS, Clock(1.0))
+    assert view.tracks() == []
+    kite, crow = [(START, 47.0, 8.0, 15.0), (START + 1.0, 47.1, 8.0, 15.0)], [(START, 46.0, 8.0, 25.0)]
+    missions = {
+        name: SimpleNamespace(flight=Flight(track=track)) for name, track in (("kite", kite), ("crow", crow))
+    }
+    squad: Any = SimpleNamespace(missions=missions)
+    view.squad = squad
+    assert view.tracks() == [[(47.0, 8.0), (47.1, 8.0)], [(46.0, 8.0)]]
+
+
 @pytest.mark.parametrize("heading", [0.0, 350.0, math.nan])
 def test_a_heading_that_is_not_known_is_told_as_that_and_not_as_north(heading: float) -> None:
     pose = pose_state(pose_of(stands(heading_deg=heading)), "degrees")

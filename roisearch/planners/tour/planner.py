@@ -171,9 +171,8 @@ class TourPlanner:
         self._known[cells] = actual
         self._settle(belief)
         wrong = (np.abs(actual - expected) > 0.25 * expected) & self._reach.ravel()[cells]
-        usual = desk.worth / max(desk.size, 1)
         for cell in cells[wrong].tolist():
-            self._expect(belief, cell, usual)
+            self._expect(belief, cell)
         if wrong.any():
             self._settle(belief)
             self._idle = 0
@@ -250,9 +249,8 @@ class TourPlanner:
                 self._desk.remove(int(self._desk.tour.place[looks[0]]))
         return flown
 
-    def _expect(self, belief: Belief, cell: int, usual: float) -> None:
-        """Let the looks at `cell` be worth what the belief says, where they are worth that, and put in those that it
-        makes worth it. The tour must be settled after; `usual` is what its looks are worth on average."""
+    def _expect(self, belief: Belief, cell: int) -> None:
+        """Let the looks at `cell` be worth what the belief says, and put in those that it makes worth it."""
         desk, worth = self._desk, float(self._p[cell]) * float(belief.weights[cell])
         looks = desk.looks_at(cell)
         for k in range(MOST_LOOKS):
@@ -263,13 +261,6 @@ class TourPlanner:
                     desk.remove(int(desk.tour.place[looks[k]]))
                     self._settle(belief)
                     desk.insert(cell, worth)
-                elif 2.0 * worth < known:  # others looked there: first comes what they left
-                    desk.remove(int(desk.tour.place[looks[k]]))
-                    if worth > usual:
-                        self._settle(belief)
-                        desk.insert(cell, worth)
-                    elif worth > 0.0:
-                        desk.append(cell, worth)
             elif worth > self._least and desk.space > 0:
                 self._settle(belief)
                 desk.insert(cell, worth)

@@ -36,6 +36,7 @@ def test_pictures_have_the_tracks_of_all_aircraft_and_no_line_between_them(
         drawn.append(figure)
         return b""
 
+    # what is drawn can be told from lines, and hardly from pixels
     monkeypatch.setattr(picture, "_png", keep)
     ReplayView(folder).picture()()
     draw_maps(read_run(folder))

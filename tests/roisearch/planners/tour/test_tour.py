@@ -374,21 +374,6 @@ def test_a_tour_says_when_there_was_no_time_to_make_a_good_one(deadline_s: float
     assert planner.hasty is hasty  # the same plan
 
 
-def test_ground_that_others_have_searched_is_not_where_the_tour_goes_first() -> None:
-    belief, rng, state = Belief(np.ones((24, 24))), np.random.default_rng(2), SearchState((0, 0), "east")
-    planner = TourPlanner(
-        TourSettings(looks=2000, first=5, proposals=2000, iterations=0),
-        fov=FieldOfView.point(0.9, 0.95),
-        motion=MOTION,
-    )
-    planner.plan(belief, state, rng)
-    searched = [cell for cell in dict.fromkeys(planner.ahead(100)) if cell != (0, 0)]
-    belief.observe(searched, False, 0.9, 0.95)
-    planner.plan(belief, state, rng)
-    ahead = planner.ahead(60)
-    assert sum(cell in searched for cell in ahead) < 30  # some lie on the way
-
-
 def test_a_tour_begins_where_the_aircraft_is_when_it_is_far_from_where_it_was() -> None:
     belief, rng = Belief(np.ones((40, 40))), np.random.default_rng(2)
     planner = planner_on(np.ones((40, 40)))

@@ -376,14 +376,17 @@ def flight_left_s(mission: Mission, now: float) -> float | None:
 
 
 def pose_of(mission: Mission | None) -> FramePose | None:
-    """Where an aircraft is, metres above the launch point of the search; None while that is not known."""
+    """Where an aircraft is, metres above the launch point of the search; None while that is not known.
+
+    How high home lies over a ground file is not known before home is told: then it is as high as the launch point.
+    """
     if mission is None or not mission.vehicle.telemetry.position_known:
         return None
-    telemetry = mission.vehicle.telemetry
+    telemetry, home_m = mission.vehicle.telemetry, mission.core.helm.heights.home_m
     return FramePose(
         telemetry.lat,
         telemetry.lon,
-        telemetry.alt_home_m + mission.core.helm.heights.home_m,
+        telemetry.alt_home_m + (home_m if math.isfinite(home_m) else 0.0),
         telemetry.heading_deg,
         telemetry.position_time,
         finite_or_level(telemetry.pitch_deg),

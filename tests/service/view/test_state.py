@@ -120,10 +120,13 @@ def stands(home_m: float = 0.0, **told: float) -> Any:
     return SimpleNamespace(vehicle=SimpleNamespace(telemetry=telemetry(**told)), core=core)
 
 
-def test_a_live_height_is_over_the_launch_point_as_a_replays_is_wherever_home_lies() -> None:
-    pose = pose_of(stands(home_m=30.0, alt_home_m=15.0))
+@pytest.mark.parametrize(("home_m", "height_m"), [(30.0, 45.0), (math.nan, 15.0)])
+def test_a_live_height_is_over_the_launch_point_as_a_replays_is_wherever_home_lies(
+    home_m: float, height_m: float
+) -> None:
+    pose = pose_of(stands(home_m, alt_home_m=15.0))
     assert pose is not None
-    assert pose.height_m == 45.0
+    assert pose.height_m == height_m
 
 
 def test_the_time_left_is_that_of_this_sortie_by_the_aircrafts_own_settings() -> None:

@@ -344,8 +344,8 @@ def test_a_plan_that_leads_around_to_where_it_began_is_flown_on_once_it_was(flow
         SearchState((15, 15), "west"),
     )
     planner.plan(belief, here, rng)
-    around = [(14, 15), (14, 16), (15, 16), (15, 15), (14, 15), (13, 15)]
-    path = np.array([row * 30 + col for row, col in around] + [12 * 30 + 15, 13 * 30 + 15] * 47)
+    around = [(14, 15), (14, 16), (15, 16), (15, 15), (15, 14), (15, 13)]
+    path = np.array([row * 30 + col for row, col in around] + [15 * 30 + 12, 15 * 30 + 13] * 47)
     planner.take_up(Kept(path, np.full(path.size, ANYWHERE)))
     planner.plan(belief, here, rng)
     before = planner.committed()

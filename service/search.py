@@ -29,6 +29,7 @@ from service.area import Grid
 from service.chances import sure
 from service.common import Common
 from service.config import Settings, each_aircraft
+from service.drafting import Drafting, plan_at_leisure
 from service.drawing import Drawing
 from service.evidence.cover import covered_p_tp
 from service.evidence.found import Found
@@ -69,13 +70,6 @@ class Foreseeing(NamedTuple):
 
     planner: Planner
     deadline_s: float | None
-
-
-class Draft(NamedTuple):
-    """A planner whose plan is made beside the flight, and the one that flies meanwhile."""
-
-    planner: Future[Planner]
-    instead_of: Planner
 
 
 def begin(grid: Grid, settings: Settings) -> Common:
@@ -127,7 +121,8 @@ class Search:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
         self._school = ThreadPoolExecutor(max_workers=1, thread_name_prefix="motion")
         self._learning: Future[None] | None = None
-        self._draft: Draft | None = None
+        self.drafting = Drafting(self._school)
+        """Where a plan is made beside the flight."""
         self.expected_s: float | None = None
         """Seconds to the first detection, by the last decision; None: it did not count them."""
         self._rng = np.random.default_rng(settings.run.seed)
@@ -255,7 +250,7 @@ class Search:
             self.ending = self.ending_of(self.planner)
             self._plans_otherwise()
             thought = self.belief.copy() if belief is None else belief
-            _plan_at_leisure(self.planner, thought, SearchState(self.grid.start), self._rng, deadline_s)
+            plan_at_leisure(self.planner, thought, SearchState(self.grid.start), self._rng, deadline_s)
 
     def redrawn(self, now: float) -> Sketch | None:
         """Regions that are ready to be written down and taken (`take_sketch`), if there are any; looks for the next.
@@ -461,7 +456,7 @@ class Search:
     def _begin_draft(self, hasty: Planner, thought: Belief, state: SearchState, decision: Decision) -> None:
         """A decision left no time for a good plan: have one made beside the flight, which goes on by the hasty one
         until then."""
-        if self._draft is not None:
+        if self.drafting.under_way is not None:
             return
         times = self.arrivals(decision.path, state.cell, state.heading, state.speed_mps)
         flown = decision.path[: max(1, int(np.searchsorted(times, DRAFTED_AFTER_S)))]
@@ -469,25 +464,19 @@ class Search:
         before = (state.cell, *flown)[-2]
         there = SearchState(flown[-1], direction_between(before, flown[-1]), self.motion.speed_mps)
         rng = self._rng.spawn(1)[0]
-        self._draft = Draft(self._school.submit(self._plan_beside, thought, there, rng), hasty)
+        self.drafting.begin(hasty, functools.partial(self._plan_beside, thought, there, rng))
 
     def _plan_beside(self, thought: Belief, state: SearchState, rng: np.random.Generator) -> Planner:
         planner = self._make_planner()
-        _plan_at_leisure(planner, thought, state, rng, GETS_READY_S / self.settings.speedup)
+        plan_at_leisure(planner, thought, state, rng, GETS_READY_S / self.settings.speedup)
         return planner
 
     def _take_draft(self) -> None:
-        """Go on by a plan that was made beside the flight, if one is ready, unless the ground is another one by now."""
-        if self._draft is None or not self._draft.planner.done():
-            return
-        draft, self._draft = self._draft, None
-        if failure := draft.planner.exception():
-            log.error(
-                "a plan that was made beside the flight has failed, which goes on as it was: %s", failure
-            )
-        elif self.planner is draft.instead_of:
-            self.planner = self.ending.planner = draft.planner.result()
-            self._thread.submit(self._catch_up, self.planner)
+        """Go on by a plan that was made beside the flight, if one is ready."""
+        drafted = self.drafting.taken(self.planner)
+        if drafted is not None:
+            self.planner = self.ending.planner = drafted
+            self._thread.submit(self._catch_up, drafted)
             self._plans_otherwise()
 
     def _catch_up(self, planner: Planner) -> None:
@@ -556,12 +545,3 @@ class Search:
     def reason(self, decision: Decision, cell: Cell) -> Reason:
         """The decision in words: where to, how much is there, how far, and what else was weighed."""
         return explain(decision, cell, self.belief.probability(), self.regions, self.grid.frame.cell_m)
-
-
-def _plan_at_leisure(
-    planner: Planner, belief: Belief, state: SearchState, rng: np.random.Generator, deadline_s: float | None
-) -> None:
-    """Make a first plan with as much time as there is, which is as good as it gets."""
-    planner.plan(belief, state, rng, deadline_s=deadline_s)
-    if isinstance(planner, Hasty):
-        planner.hasty = False

@@ -203,8 +203,8 @@ def test_a_plan_that_was_made_in_a_hurry_is_made_again_beside_the_flight(what: s
     hasty = built.planner
     first = asyncio.run(built.decide(state, ()))
     asyncio.run(built.decide(state, ()))  # which waits for nothing
-    assert built._draft is not None  # how long it takes is told nowhere
-    built._draft.planner.result(timeout=60.0)
+    assert built.drafting.under_way is not None
+    built.drafting.under_way.result(timeout=60.0)
     path = first.path[:4]
     then = SearchState(path[-1], direction_between(path[-2], path[-1]), 8.0)
     after = asyncio.run(built.decide(then, path))
@@ -214,15 +214,15 @@ def test_a_plan_that_was_made_in_a_hurry_is_made_again_beside_the_flight(what: s
     for _ in range(3):
         asyncio.run(built.decide(then, path))
     assert built.planner is drafted  # it is as good as it gets
-    assert built._draft is None
+    assert built.drafting.under_way is None
 
 
 def test_a_plan_for_ground_that_is_another_one_by_now_is_not_flown() -> None:
     built = search(deadline_s=0.02)
     asyncio.run(built.decide(SearchState(GRID.start), ()))
-    draft = built._draft  # when it is ready is told nowhere
+    draft = built.drafting.under_way
     assert draft is not None
-    draft.planner.result(timeout=60.0)
+    draft.result(timeout=60.0)
     flyable = GRID.flyable.copy()
     flyable[0] = False
     built.common.fly_on(replace(GRID, flyable=flyable))

@@ -36,12 +36,16 @@ class Drafting:
         if self.under_way is None or not self.under_way.done():
             return None
         made, self.under_way = self.under_way, None
+        if flies is not self._instead_of:
+            return None
         if failure := made.exception():
             log.error(
-                "a plan that was made beside the flight has failed, which goes on as it was: %s", failure
+                "a plan that was made beside the flight has failed, and the search goes on by the hasty one: %s",
+                failure,
             )
+            _is_good_enough(flies)  # another try would fail as well
             return None
-        return made.result() if flies is self._instead_of else None
+        return made.result()
 
 
 def plan_at_leisure(
@@ -49,5 +53,10 @@ def plan_at_leisure(
 ) -> None:
     """Make a first plan with as much time as there is, which is as good as it gets."""
     planner.plan(belief, state, rng, deadline_s=deadline_s)
+    _is_good_enough(planner)
+
+
+def _is_good_enough(planner: Planner) -> None:
+    """No other plan is to be made in the place of this planner's."""
     if isinstance(planner, Hasty):
         planner.hasty = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from concurrent.futures import wait
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from roisearch import Decision, Motion, SearchState
 from roisearch.directions import DIRECTIONS, direction_between
 from roisearch.motion_fit import Flown
+from roisearch.planners.base import Planner
 from roisearch.planners.lookahead.planner import LookaheadPlanner
 from roisearch.planners.tour.planner import TourPlanner
 from service.config import MOCK_SPEEDUP, PlannerName, Settings
@@ -229,3 +231,25 @@ def test_a_plan_for_ground_that_is_another_one_by_now_is_not_flown() -> None:
     planner = built.planner
     asyncio.run(built.decide(SearchState(GRID.start), ()))
     assert built.planner is planner
+
+
+def test_a_plan_beside_the_flight_that_fails_is_said_once_and_the_flight_goes_on(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    built = search(deadline_s=0.02)
+    hasty = built.planner
+
+    def fail(*_: object, **__: object) -> Planner:
+        raise RuntimeError("out of memory")
+
+    # nothing that is asked for makes a plan fail
+    monkeypatch.setattr(built, "_make_planner", fail)
+    for _ in range(4):
+        decision = asyncio.run(built.decide(SearchState(GRID.start), ()))
+        assert decision.path
+        if built.drafting.under_way is not None:
+            wait([built.drafting.under_way], timeout=60.0)
+    assert built.planner is hasty
+    assert [each.getMessage() for each in caplog.records if "beside the flight" in each.getMessage()] == [
+        "a plan that was made beside the flight has failed, and the search goes on by the hasty one: out of memory"
+    ]

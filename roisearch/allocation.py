@@ -24,8 +24,10 @@ PROMISING, ROUNDS = 4, 4
 """Sets of plans that are improved, and how often each of the searchers plans for that."""
 CUTS = 16
 """Ways in which the mass is cut into shares."""
-AT_ONCE_S = 1e-6
+AT_ONCE = 1e-6
+"""Steps from now after which what is out of a share counts as looked at: before the first of its own."""
 NO_SWEEP = 1.0
+"""Down to this share of its largest worth no region is swept first: the plan is the rollout's rule alone."""
 
 
 def shares(mass: NDArray[np.float64], rates: Sequence[float], rng: np.random.Generator) -> NDArray[np.int64]:
@@ -81,16 +83,14 @@ class Allocation:
     ) -> None:
         self._crew, self._searchers, self._tell, self._plan = crew, searchers, tell, plan
         self._belief, self._states, self._rng, self._now_s = belief, states, rng, now_s
+        self._regions = 0
 
     def make(self, openings: int) -> None:
         """Try so many openings, and `CUTS` shares, and leave all with the best plans."""
         best, kept = self._improved(), self._kept()
-        regions = min(planner.regions for planner in self._crew.values())
-        tried: list[tuple[float, list[Kept]]] = []
-        for _ in range(openings if regions else 0):
-            tried.append((self._open(), self._kept()))
-        for _ in range(CUTS if openings and regions else 0):
-            tried.append((self._cut(), self._kept()))
+        self._regions = min(planner.regions for planner in self._crew.values())  # all have planned by now
+        ways = [self._open] * openings + [self._cut] * CUTS if self._regions and openings else []
+        tried = [(way(), self._kept()) for way in ways]
         for _, plans in sorted(tried, key=lambda each: each[0])[:PROMISING]:
             self._take_up(plans)
             expected = self._improved()
@@ -109,11 +109,13 @@ class Allocation:
 
     def _open(self) -> float:
         """Let each sweep a region first, down to a share of its worth; what is then expected, in seconds."""
-        regions = min(planner.regions for planner in self._crew.values())
         for name in self._crew:
             self._searchers[name].looks = NO_LOOKS
         for name, planner in self._crew.items():
-            region, share = 1 + int(self._rng.integers(regions)), float(10.0 ** -self._rng.uniform(0.3, 1.7))
+            region, share = (
+                1 + int(self._rng.integers(self._regions)),
+                float(10.0 ** -self._rng.uniform(0.3, 1.7)),
+            )
             self._tell(name)
             planner.open_with(region, share)
             self._commit(name, planner)
@@ -126,7 +128,7 @@ class Allocation:
         for number, (name, planner) in enumerate(self._crew.items()):
             elsewhere = np.argwhere((of >= 0) & (of != number))
             count = len(elsewhere)
-            gone = OthersLooks(np.full(count, AT_ONCE_S), elsewhere, np.ones(count))
+            gone = OthersLooks(np.full(count, AT_ONCE), elsewhere, np.ones(count))
             planner.reckon_with_others(gone, len(self._crew))
             planner.open_with(1, NO_SWEEP)
             self._commit(name, planner)

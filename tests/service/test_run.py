@@ -25,14 +25,20 @@ def test_an_area_with_a_long_name_has_a_folder(name: str, tmp_path: Path) -> Non
     assert len(folder.name) < 150
 
 
+def interrupted(parent: Path) -> Path:
+    """The folder of a run that was interrupted before it flew, and whose next process waits a second for its link."""
+    folder = record(parent / "slope", part=0.0)
+    with contextlib.closing(Journal(folder / JOURNAL)) as journal:
+        settings = journal.meta("settings")
+        journal.set_meta("settings", {**settings, "link": {**settings["link"], "connect_timeout_s": 1.0}})
+    return folder
+
+
 def test_going_on_without_flying_overwrites_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Nobody is heard on the link: what the flight before has left stays."""
-    folder = record(tmp_path / "slope", part=0.0)
-    with contextlib.closing(Journal(folder / JOURNAL)) as journal:
-        settings = journal.meta("settings")
-        journal.set_meta("settings", {**settings, "link": {**settings["link"], "connect_timeout_s": 1.0}})
+    folder = interrupted(tmp_path)
     for name in (REPORT, "track.geojson", "map.png"):
         (folder / name).write_text("as it was")
     words = ["--resume", str(folder), "--connect", "udpin://127.0.0.1:0", "--http", "127.0.0.1:0", "--flat"]
@@ -44,10 +50,7 @@ def test_going_on_without_flying_overwrites_nothing(
 def test_one_link_that_is_missing_keeps_no_other_from_being_gone_on_with(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = record(tmp_path / "slope", part=0.0)
-    with contextlib.closing(Journal(folder / JOURNAL)) as journal:
-        settings = journal.meta("settings")
-        journal.set_meta("settings", {**settings, "link": {**settings["link"], "connect_timeout_s": 1.0}})
+    folder = interrupted(tmp_path)
     gone = f"serial://{tmp_path / 'gone'}:57600"
     links = ["--connect", "udpin://127.0.0.1:0", "--connect", gone]
     assert main(["--resume", str(folder), *links, "--http", "127.0.0.1:0", "--flat"]) == 4

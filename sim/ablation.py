@@ -1,11 +1,14 @@
-"""`roisearch-sim ablation`: what each part of the sweep planner is worth, by the exact detection curve.
+"""`roisearch-sim ablation`: what each part of the default planner is worth, by the exact detection curve.
 
 Every variant flies the same held-out priors from the paper's start, planning at every step; only a path
 that was given without thinking is flown to its end before the next plan, when no false alarm can end it.
 E[T] is restricted to the cap of 40 000 steps and set against what the prior allows: the release bound with
 a point field of view, the multi-cell bound with another one. With a point field of view and false alarms
 it is set against the teleporting reference (`roisearch.bounds`). Both sides are averaged over the same
-number of draws, seeded alike. The results are kept in the folder: the same command goes on where it stopped.
+number of draws, seeded alike. With `--motion` all of it is in seconds of flight: the default is then the planner of
+tours, with its settings, a planner that knows no motion flies its cells with the same aircraft, E[T] is restricted to
+the time of as many straight cells, and the release bound in seconds is what it is set against. The results are kept
+in the folder: the same command goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -24,20 +27,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roisearch import PLANNERS, Belief, Decision, FieldOfView, Planner, SearchState, make_planner
-from roisearch.bounds import expected_time, multi_cell, release, teleport_reference
+from roisearch import PLANNERS, Belief, Decision, FieldOfView, Motion, Planner, SearchState, make_planner
+from roisearch.bounds import (
+    expected_seconds,
+    expected_time,
+    multi_cell,
+    release,
+    release_seconds,
+    teleport_reference,
+)
 from roisearch.planners.base import Progress
-from roisearch.planners.lookahead.planner import LookaheadPlanner
 from roisearch.planners.lookahead.settings import LookaheadSettings
+from roisearch.planners.tour.settings import TourSettings
 from service.errors import Parser
+from sim import ruler_seconds
 from sim.ruler import Ruler, detection_curve
-from sim.scenario import EQUAL, PAPER_START, PAPER_STEPS, paper_prior
+from sim.scenario import EQUAL, PAPER_SHAPE, PAPER_START, PAPER_STEPS, paper_prior
+from sim.trials.flight import CELL_M, SPEED_MPS
 
 P_TP = 0.9
 VARIANTS = "iterations=0 iterations=1,horizon=3000 iterations=16,horizon=5000"
 SHARES = (50.0, 95.0, 99.9, 100.0)
 """Percentiles of the time that a decision takes; the last is the slowest."""
-KEY = ("variant", "fov", "p_tn", "equal", "deadline_ms", "stop_below", "seed", "draw")
+DEFAULT = "puct-regions-lite"
+KEY = ("variant", "fov", "p_tn", "equal", "side", "motion", "deadline_ms", "stop_below", "seed", "draw")
 """The fields that tell one result from another."""
 FIELDS = (*KEY, "expected", "reference", "steps", "first_cpu_ms", "first_wall_ms",
           *(f"cpu_ms_{p:g}" for p in SHARES), *(f"wall_ms_{p:g}" for p in SHARES))  # fmt: skip
@@ -71,22 +84,31 @@ class Clocked:
         return times[0], np.percentile(times[1:] if len(times) > 1 else times, SHARES, axis=0)
 
 
-def planner_named(name: str, fov: FieldOfView) -> Planner:
-    """A planner by its name, or the sweep planner with settings such as `iterations=4,horizon=1000`.
+def motion_of(options: argparse.Namespace) -> Motion | None:
+    """The aircraft of `--motion`; None: in steps."""
+    if options.motion is None:
+        return None
+    return Motion(cell_m=CELL_M, speed_mps=SPEED_MPS, acceleration_mps2=options.motion)
+
+
+def planner_named(name: str, fov: FieldOfView, motion: Motion | None = None) -> Planner:
+    """A planner by its name, or the default with settings such as `iterations=4,horizon=1000`.
 
     Raises:
         ValueError: when there is no such planner or setting, in one sentence.
     """
+    shared = {"fov": fov} if motion is None else {"fov": fov, "motion": motion}
     if name in PLANNERS:
-        return make_planner(name, fov=fov)
-    types = {field.name: str(field.type) for field in dataclasses.fields(LookaheadSettings)}
+        return make_planner(name, **shared)
+    kind = LookaheadSettings if motion is None or not fov.is_point else TourSettings
+    types = {field.name: str(field.type) for field in dataclasses.fields(kind)}
     values: dict[str, Any] = {}
     for part in name.split(","):
         key, _, value = part.partition("=")
         if key not in types:
             raise ValueError(f"'{key}' is neither a planner nor one of the settings {', '.join(types)}")
         values[key] = float(value) if types[key] == "float" else int(value)
-    return LookaheadPlanner(LookaheadSettings(**values), fov=fov)
+    return make_planner(DEFAULT, **shared, **values)
 
 
 def field_of_view(name: str, p_tn: float) -> FieldOfView:
@@ -95,8 +117,18 @@ def field_of_view(name: str, p_tn: float) -> FieldOfView:
     return made[name](P_TP, p_tn)
 
 
-def reference_time(prior: NDArray[np.float64], fov: FieldOfView, p_tn: float, seed: tuple[int, int]) -> float:
+def cap_of(motion: Motion) -> float:
+    """The seconds to which E[T] is restricted."""
+    return PAPER_STEPS * motion.cell_m / motion.speed_mps
+
+
+def reference_time(
+    prior: NDArray[np.float64], fov: FieldOfView, p_tn: float, seed: tuple[int, int], motion: Motion | None
+) -> float:
     """E[T] of what the result is set against, which `reference_named` says; see the module's text."""
+    if motion is not None:
+        times, found = release_seconds(prior, PAPER_START, P_TP, motion, cap_of(motion))
+        return expected_seconds(times, found, cap_of(motion))
     if not fov.is_point:
         return expected_time(multi_cell(prior, PAPER_START, fov, P_TP, PAPER_STEPS))
     if p_tn == 1.0:
@@ -107,22 +139,30 @@ def reference_time(prior: NDArray[np.float64], fov: FieldOfView, p_tn: float, se
 
 def reference_named(options: argparse.Namespace) -> str:
     """What `reference_time` is the time of."""
-    point = field_of_view(options.fov, options.p_tn).is_point
-    return "the teleporting reference" if point and options.p_tn < 1.0 else "the bound"
+    teleports = options.fov == "point" and options.p_tn < 1.0 and options.motion is None
+    return "the teleporting reference" if teleports else "the bound"
 
 
 def fly(variant: str, seed: int, draw: int, options: argparse.Namespace) -> Row:
     """One search of one prior: its row of the results."""
-    fov = field_of_view(options.fov, options.p_tn)
-    prior = paper_prior(np.random.default_rng(seed), equal=options.equal)
-    planner = Clocked(planner_named(variant, fov))  # a new one: it takes its regions from the first belief
-    deadline = None if options.deadline_ms is None else options.deadline_ms / 1000.0
+    fov, motion = field_of_view(options.fov, options.p_tn), motion_of(options)
+    prior = paper_prior(np.random.default_rng(seed), (options.side, options.side), equal=options.equal)
+    planner = Clocked(
+        planner_named(variant, fov, motion)
+    )  # a new one: it takes its regions from the first belief
     follow = variant not in PLANNERS and options.p_tn == 1.0
-    ruler = Ruler(P_TP, options.p_tn, fov, deadline, options.stop_below, follow)
     rng = np.random.default_rng((seed, draw))
-    curve = detection_curve(planner, prior, PAPER_START, PAPER_STEPS, ruler, rng)
+    if motion is None:
+        deadline = None if options.deadline_ms is None else options.deadline_ms / 1000.0
+        ruler = Ruler(P_TP, options.p_tn, fov, deadline, options.stop_below, follow)
+        expected = expected_time(detection_curve(planner, prior, PAPER_START, PAPER_STEPS, ruler, rng))
+    else:
+        how = ruler_seconds.How(
+            PAPER_START, fov=fov, steps=PAPER_STEPS, stop_below=options.stop_below, follow=follow
+        )
+        expected = ruler_seconds.fly(planner, prior, motion, rng, how).expected(cap_of(motion))
     first, others = planner.milliseconds()
-    numbers = [expected_time(curve), reference_time(prior, fov, options.p_tn, (seed, draw))]
+    numbers = [expected, reference_time(prior, fov, options.p_tn, (seed, draw), motion)]
     clocks = [*first, *others[:, 0], *others[:, 1]]
     texts = [*key_of(variant, seed, draw, options), *(f"{x:.3f}" for x in numbers), str(len(planner.times)),
              *(f"{x:.4f}" for x in clocks)]  # fmt: skip
@@ -131,8 +171,8 @@ def fly(variant: str, seed: int, draw: int, options: argparse.Namespace) -> Row:
 
 def key_of(variant: str, seed: int, draw: int, options: argparse.Namespace) -> tuple[str, ...]:
     """The values of `KEY`."""
-    return (variant, options.fov, f"{options.p_tn:g}", options.equal, f"{options.deadline_ms or 0:g}",
-            f"{options.stop_below:g}", str(seed), str(draw))  # fmt: skip
+    return (variant, options.fov, f"{options.p_tn:g}", options.equal, str(options.side), f"{options.motion or 0:g}",
+            f"{options.deadline_ms or 0:g}", f"{options.stop_below:g}", str(seed), str(draw))  # fmt: skip
 
 
 def averaged(rows: list[Row]) -> NDArray[np.float64]:
@@ -174,9 +214,13 @@ def summary_of(rows: list[Row]) -> dict[str, Any]:
 
 def report(rows: list[Row], options: argparse.Namespace, command: str) -> str:
     """The results as Markdown."""
+    how = "" if options.motion is None else (
+        f"in seconds of flight, cells of {CELL_M:g} m, {SPEED_MPS:g} m/s, {options.motion:g} m/s2, "
+    )  # fmt: skip
     lines = [
-        f"{options.fov} field of view, p_tp = {P_TP:g}, p_tn = {options.p_tn:g}, start {PAPER_START}, at most "
-        f"{PAPER_STEPS} steps; one standard error after ±.", "", f"    {command}", "",
+        f"{options.fov} field of view, p_tp = {P_TP:g}, p_tn = {options.p_tn:g}, {options.side} x {options.side} "
+        f"cells, start {PAPER_START}, {how}at most {PAPER_STEPS} steps; one standard error after ±.", "",
+        f"    {command}", "",
         f"| planner | priors | E[T] | of {reference_named(options)} | above it: ratio of sums | mean of ratios "
         "| decision, processor ms: 50, 95, 99.9 %, most | by the clock | the first |",
         "|---" * 9 + "|",
@@ -229,7 +273,7 @@ def plot(rows: list[Row], variants: list[str], reference: str, path: Path) -> No
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     p = Parser(prog="roisearch-sim ablation", description=__doc__)
-    p.add_argument("--variants", default=VARIANTS, help="planners, or settings of the sweep planner, with spaces "
+    p.add_argument("--variants", default=VARIANTS, help="planners, or settings of the default, with spaces "
                    f"between (default '{VARIANTS}')")  # fmt: skip
     p.add_argument("--first", type=int, default=5000, help="seed of the first prior (default 5000)")
     p.add_argument("--priors", type=int, default=40, help="how many (default 40)")
@@ -237,6 +281,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--p-tn", type=float, default=1.0, help="P(no hit | target not there) (default 1)")
     p.add_argument("--draws", type=int, default=1, help="draws of false alarms for each prior (default 1)")
     p.add_argument("--equal", choices=EQUAL, default="height", help="what the Gaussians share")
+    p.add_argument("--side", type=int, default=PAPER_SHAPE[0], help="cells on a side (default 200)")
+    p.add_argument("--motion", type=float, metavar="MPS2", help="fly in seconds, with an aircraft of this acceleration "
+                   f"on cells of {CELL_M:g} m at {SPEED_MPS:g} m/s")  # fmt: skip
     p.add_argument("--deadline-ms", type=float, help="handed to plan() at every step (not repeatable)")
     p.add_argument("--stop-below", type=float, default=5e-5, help="undetected mass at which F is held")
     p.add_argument("--out", type=Path, default=Path("ablation"), help="folder of the results")
@@ -248,8 +295,10 @@ def main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments)
     variants = options.variants.split()
     try:
+        if options.motion is not None and options.deadline_ms is not None:
+            raise ValueError("a deadline is for steps; with --motion leave --deadline-ms out")
         for variant in variants:
-            planner_named(variant, field_of_view(options.fov, options.p_tn)).warm_up()
+            planner_named(variant, field_of_view(options.fov, options.p_tn), motion_of(options)).warm_up()
     except ValueError as error:
         print(f"roisearch-sim ablation: {error}", file=sys.stderr)
         return 2

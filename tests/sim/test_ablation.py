@@ -107,3 +107,32 @@ def test_table_and_figure_name_what_they_are_set_against_and_show_every_variant(
 def test_an_unknown_setting_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert ablation.main(["--variants", "depth=4", "--out", str(tmp_path)]) == 2
     assert "'depth' is neither a planner nor one of the settings" in capsys.readouterr().err
+
+
+def test_in_seconds_the_parts_of_the_tour_stand_above_the_bound_in_seconds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(ablation, "PAPER_STEPS", 3000)
+    arguments = [
+        "--motion",
+        "1.5",
+        "--side",
+        "24",
+        "--priors",
+        "1",
+        "--stop-below",
+        "0.02",
+        "--out",
+        str(tmp_path),
+    ]
+    assert ablation.main([*arguments, "--variants", "first=480 first=0,iterations=0 index"]) == 0
+    with (tmp_path / "results.csv").open(newline="") as file:
+        rows = {row["variant"]: row for row in csv.DictReader(file)}
+    annealed, ruled, steps = (float(row["expected"]) for row in rows.values())
+    assert float(rows["index"]["reference"]) < annealed <= ruled < steps
+    assert "24 x 24 cells" in (text := (tmp_path / "ablation.md").read_text())
+    assert "in seconds of flight, cells of 25 m, 8 m/s, 1.5 m/s2" in text
+    assert ablation.main([*arguments, "--variants", "keep=0.5"]) == 2
+    assert "'keep' is neither a planner nor one of the settings looks" in capsys.readouterr().err
+    assert ablation.main([*arguments, "--deadline-ms", "38"]) == 2
+    assert "leave --deadline-ms out" in capsys.readouterr().err

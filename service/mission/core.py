@@ -79,6 +79,7 @@ from service.mission.phase import (
     GoOn,
     Happen,
     Hold,
+    Late,
     Listen,
     Lost,
     Overtaken,
@@ -404,6 +405,8 @@ class MissionCore:
                 self._logbook.begins(self._seen.telemetry, now)
             case Stand():
                 self._want(self._logbook.stands(self._seen, now))
+            case Late():
+                self.terms = replace(self.terms, restarted=True)
             case GoOn():
                 self._want(self._logbook.goes_on(self._seen, now))
             case Settle(why=""):

@@ -7,6 +7,7 @@ Whoever has flown already takes off again only on a fresh order, or when the pil
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -30,8 +31,10 @@ from service.mission.phase import (
     GoOn,
     Happen,
     Hold,
+    Late,
     Phase,
     Stand,
+    Stay,
     Turn,
     Wish,
     warn,
@@ -49,12 +52,13 @@ AS_LEFT = "as it was before the restart"
 class Waiting(Phase):
     """Until the vehicle is heard, knows where it is, and says whether it is in the air.
 
-    `between`: the run was left between two sorties, when an aircraft may be switched off: it is waited for as long.
+    While others of the search are heard it is waited for, and may join them later. `between`: the run was left between
+    two sorties, when an aircraft may be switched off: it is waited for as long.
     """
 
     def __init__(self, *, between: bool = False) -> None:
         self._between = between
-        self._asked = False
+        self._asked = self._late = False
         self._since: float | None = None
         self._not_before = 0.0
         self._until: float | None = None
@@ -74,13 +78,23 @@ class Waiting(Phase):
         """It is there, or nobody is."""
         if isinstance(news, Done):
             self._until = look.now + look.settings.link.connect_timeout_s
+            if self._late:
+                yield Late()
         elif isinstance(news, Failed):
             waited_s = look.now - (self._since or look.now)
-            if not self._between or waited_s > look.settings.run.next_sortie_within_s:
+            between = self._between and waited_s <= look.settings.run.next_sortie_within_s
+            others = [each for each in look.seen.others if each.system_id is not None and not each.ended]
+            if not between and not others:
                 yield GiveUp(news.reason)
                 return
             self._asked, self._not_before = False, look.now + RETRY_S
-            yield Note(f"the next sortie's aircraft is still waited for: {news.reason}")
+            if between:
+                yield Note(f"the next sortie's aircraft is still waited for: {news.reason}")
+            elif not self._late:
+                self._late = True
+                said = f"{news.reason}; the others go on, and it may join them later"
+                yield Note(said, logging.WARNING)
+                yield Stay(said)
 
 
 class Lacks:

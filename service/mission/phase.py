@@ -103,6 +103,11 @@ class Stand:
 
 
 @dataclass(frozen=True, slots=True)
+class Late:
+    """The aircraft is heard only now, when nobody reckons with it any more: no flag of before takes it up."""
+
+
+@dataclass(frozen=True, slots=True)
 class GoOn:
     """The aircraft is in the air still, as an earlier process left it."""
 
@@ -168,6 +173,7 @@ Wish = (
     | GiveUp
     | Lost
     | Stand
+    | Late
     | GoOn
     | Settle
     | Unsettle

@@ -20,7 +20,7 @@ _FIRST, _LAST = 200, 300  # characters of a reason that has become too long
 
 def one_more(why: str, more: str) -> str:
     """A reason with one more, unless it has that: what came first and what came last, however many there were."""
-    said = why if more in why else f"{why}; {more}"
+    said = why if more in why else "; ".join(filter(None, (why, more)))
     return said if len(said) <= _FIRST + _LAST else f"{said[:_FIRST]} ... {said[-_LAST:]}"
 
 
@@ -124,7 +124,8 @@ class Terms:
     """On what terms a mission flies: how fast its clock runs, how old a position and a heartbeat may be (seconds),
     whether it may arm and take off, whether it may do so by itself where the run has flown already (an aircraft of the
     built-in world is another one then), and whether nobody asked for this start: what started the service anew is no
-    person who has looked at the aircraft. `name` is that of the aircraft, where there are several."""
+    person who has looked at the aircraft, nor is who switched it on long after the others had gone. `name` is that of
+    the aircraft, where there are several."""
 
     speedup: float = 1.0
     position_fresh_s: float = 2.0

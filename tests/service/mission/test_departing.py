@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from service.mavlink.telemetry import Home
 from service.mavlink.vehicle import climb_s
+from service.mission.apart import Other
 from service.mission.departing import LACKS_S
 from service.mission.effects import (
     Answer,
@@ -28,7 +30,7 @@ from service.mission.phase import RETRY_S
 from service.mission.states import Event, State, next_state
 from service.rows import CommandRow
 from sim.soak import ground
-from tests.service.mission.flown import LEFT_US, ON_GROUND, Talk, reached
+from tests.service.mission.flown import HERE, LEFT_US, ON_GROUND, Talk, reached
 from tests.service.mission.test_grounded import grounded
 
 STEPS = [Connect(), WaitReady(), EnterGuided(), Arm(), TakeOff(15.0)]
@@ -111,6 +113,34 @@ def test_a_vehicle_that_is_not_there_ends_the_run() -> None:
     talk.tick()
     talk.failed("nothing was heard")
     assert (talk.state, talk.core.standing.why_stopped) == (State.ABORTED, "nothing was heard")
+
+
+def test_one_that_is_not_heard_may_join_the_others_later_and_is_taken_up_by_an_order_only() -> None:
+    """Somebody switches it on, and has a hand on it, long after the flag to take off was given."""
+    talk = Talk(may_take_off=True, **ON_GROUND)
+    talk.sees(others=(Other("2", HERE, 60.0, HERE, HERE, 60.0, 8.0, system_id=2),))
+    for _ in range(2):
+        talk.tick()
+        talk.failed("nothing was heard")
+        talk.pass_by(RETRY_S + 0.5)
+    assert (talk.state, talk.doing()) == (State.WAITING, Connect())
+    said = "nothing was heard; the others go on, and it may join them later"
+    assert talk.core.standing.why == said
+    assert [effect.text for effect in talk.wanted if isinstance(effect, Note)] == [said]
+    talk.done()
+    talk.pass_by(30.0)
+    assert (talk.state, talk.core.doing) == (State.READY, None)
+    talk.on(Order("launch", 7))
+    assert talk.doing() == WaitReady()
+
+
+@pytest.mark.parametrize("changes", [{"system_id": None}, {"system_id": 2, "ended": True}])
+def test_one_that_is_not_heard_is_not_waited_for_where_no_other_is_there(changes: dict[str, Any]) -> None:
+    talk = Talk()
+    talk.sees(others=(replace(Other("2", HERE, 60.0, HERE, HERE, 60.0, 8.0), **changes),))
+    talk.tick()
+    talk.failed("nothing was heard")
+    assert talk.state == State.ABORTED
 
 
 def test_a_step_that_failed_ends_the_run_unless_the_pilot_is_why() -> None:

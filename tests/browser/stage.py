@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import socket
 import sqlite3
 import struct
 import time
@@ -19,6 +18,7 @@ from playwright.sync_api import Browser, Locator, Page, Response, expect
 from sim.autopilot.control import Control
 from sim.autopilot.process import AutopilotProcess
 from tests.integration.flight import REPOSITORY, Process, running
+from tests.ports import free_port
 
 PATIENCE_MS = 60_000
 AREA = REPOSITORY / "config" / "area.geojson"
@@ -187,14 +187,6 @@ def searching(watch: Watch) -> None:
     """Wait until the search is on."""
     watch.shows("SEARCHING", "CONFIRMING")
     expect(watch.page.locator("#pos")).not_to_have_text("–")
-
-
-def free_port() -> int:
-    """A port that nobody has at the moment."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def write_tiles(path: Path) -> None:

@@ -21,10 +21,11 @@ from playwright.sync_api import Browser, Locator, expect
 from service.area.frame import GridFrame
 from sim.autopilot.process import AutopilotProcess
 from tests.integration.flight import Process, only_report, running
+from tests.ports import free_port
 
 from .hands import Fingers, Keyboard
 from .scripted import JPEG
-from .stage import LAUNCH, PATIENCE_MS, free_port
+from .stage import LAUNCH, PATIENCE_MS
 
 pytestmark = pytest.mark.timeout(300)
 SPEEDUP = 12.0

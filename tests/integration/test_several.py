@@ -13,6 +13,7 @@ import pytest
 from service.journal import read_rows
 from sim.soak.process import Process
 from tests.integration.flight import only_report, running, service_words, write_area
+from tests.ports import free_port
 
 pytestmark = pytest.mark.timeout(400)
 
@@ -95,3 +96,28 @@ def test_two_whose_journal_is_lost_fly_home_by_our_own_way_and_land(tmp_path: Pa
     assert [each["state"] for each in report["aircraft"]] == ["DONE", "DONE"]
     assert "has been deleted" in report["stopped_because"]
     assert "Traceback" not in service.said
+
+
+def test_one_that_is_switched_on_late_joins_the_other_by_an_order(tmp_path: Path) -> None:
+    runs, settings = tmp_path / "runs", tmp_path / "settings.toml"
+    free = free_port()
+    settings.write_text("[link]\nconnect_timeout_s = 60\n[sensor]\nsilent_after_s = 1e5\n")
+    mock = ["sim", "autopilot", "--home=47.0501,8.3001,400", "--speedup", "20", "--listen"]
+    with running(*mock, "udpin://127.0.0.1:0", "--endurance", "90") as early:
+        url = early.wait_for(r"listening on (udpin://\S+)").group(1).replace("udpin", "udpout")
+        links = ["--connect", url, "--connect", f"udpout://127.0.0.1:{free}", "--takeoff", "--speedup", "20"]
+        words = service_words(write_area(tmp_path), runs, *links, "--config", str(settings))
+        with running(*words) as service, the_door(service) as door:
+            searches = ("SEARCHING", "CONFIRMING")
+            flies = [searches, ("WAITING",)]
+            wait_for(door, lambda each: each["state"] in flies[int(each["name"]) - 1], service)
+            service.wait_for("the others go on, and it may join them later")
+            with running(*mock, f"udpin://127.0.0.1:{free}", "--sysid", "2"):
+                service.wait_for("'2': order launch, or take off and select")
+                flies[1] = ("READY",)
+                wait_for(door, lambda each: each["state"] in flies[int(each["name"]) - 1], service)
+                door.post("/api/commands", json={"command": "launch", "aircraft": "2"}).raise_for_status()
+                wait_for(door, lambda each: each["state"] in searches and each["steps"] >= 1, service)
+                door.post("/api/commands", json={"command": "finish"}).raise_for_status()
+                assert service.exit_code() == 3, service.said
+    assert [each["state"] for each in only_report(runs)["aircraft"]] == ["DONE", "DONE"]

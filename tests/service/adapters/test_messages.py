@@ -23,7 +23,8 @@ from service.adapters.frigate import Watched
 from service.adapters.serve import GONE, report_all
 from service.commands.detector import main
 from service.errors import BadInput
-from tests.service.doors.test_mqtt import free_port, mosquitto, needs_mosquitto
+from tests.ports import free_port
+from tests.service.doors.test_mqtt import mosquitto, needs_mosquitto
 
 from .stage import Taking, taking
 

@@ -22,15 +22,9 @@ from service.config import DoorSettings
 from service.doors import open_doors
 from service.doors.mqtt import MOST_BYTES
 from service.errors import BadInput
+from tests.ports import free_port
 
 from .taking import PATIENCE_S, Taker, frames, lines, said, served
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin")
 needs_mosquitto = pytest.mark.skipif(

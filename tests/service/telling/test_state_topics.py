@@ -13,8 +13,9 @@ import pytest
 from service.doors.mqtt import read_broker
 from service.telling.mqtt import StateTopics, topics
 from service.telling.news import Newsdesk
+from tests.ports import free_port
 from tests.service.doors.taking import PATIENCE_S
-from tests.service.doors.test_mqtt import free_port, mosquitto, needs_mosquitto
+from tests.service.doors.test_mqtt import mosquitto, needs_mosquitto
 from tests.service.telling.seen import found, state, suspect, two_aircraft
 
 

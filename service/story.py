@@ -43,7 +43,7 @@ IN_THE_AIR = frozenset(State) - {State.WAITING, State.READY, State.GROUNDED} - F
 
 @dataclass
 class FlightSoFar:
-    """What a run has been up to a row; the lists only grow, so a time is a length of each.
+    """What a run has been up to a row; its lists only grow, so a time is a length of each.
 
     Attributes:
         state, why, event: of the last transition; WAITING before the first.
@@ -77,7 +77,7 @@ class FlightSoFar:
     track: list[TrackPoint] = field(default_factory=list)
     hits: list[LatLon] = field(default_factory=list)
     found: Found | None = None
-    sorties: list[SortieRow] = field(default_factory=list)
+    sorties: tuple[SortieRow, ...] = ()
     stopped_by: tuple[Event, str] | None = None
     last_time: float | None = None
     """When the last row was written."""
@@ -118,7 +118,7 @@ class FlightSoFar:
             case ModeRow(mode=mode):
                 self.mode = mode
             case SortieRow() as said:
-                self.sorties.append(said)
+                self.sorties = (*self.sorties, said)
             case FoundRow(found=found):
                 self.found = found
             case VerdictRow(confirmed=False, cell=cell) if self.found is not None:

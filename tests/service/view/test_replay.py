@@ -81,6 +81,7 @@ def test_a_replay_knows_each_of_several_aircraft(tmp_path: Path) -> None:
     whole = feed.message(view.moment())["tracks"]
     assert [(news["from"], len(news["rows"])) for news in whole] == [(0, 3), (0, 2)]
     view.seek(heard[3])
+    assert [each["sorties"] for each in (view.state(), *view.state()["aircraft"])] == [[], [], []]
     assert [len(track) for track in view.tracks()] == [3, 1]
     assert feed.message(view.moment())["tracks"] == [None, {"from": 1, "rows": []}]
     view.seek(view.span()[0])

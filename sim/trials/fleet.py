@@ -43,6 +43,7 @@ class FleetCampaign:
     Attributes:
         planners: of `WAYS`. searchers: how many search together, each a number of its own; one is always flown.
         trials: priors; seed: the first of them. side: rows and columns of a prior.
+        slow: over so many of them those fly that know of no other, which takes longest: each searches all of it.
         stride: cells that are flown for a decision. iterations: of a decision.
         tail: what is undetected in the end, and left out of the means; see `sim.ruler_fleet`.
         most_s: seconds after which a flight ends in any case.
@@ -52,6 +53,7 @@ class FleetCampaign:
     searchers: tuple[int, ...] = (2, 3, 4)
     trials: int = 20
     seed: int = FIRST
+    slow: int = 5
     side: int = 200
     stride: int = 4
     iterations: int = 4
@@ -87,6 +89,7 @@ class FleetCampaign:
             Job("fleet", way, str(n), trial)
             for trial in range(self.seed, self.seed + self.trials)
             for way, n in alone + together
+            if way != INDEPENDENT or trial < self.seed + self.slow
         ]
 
 

@@ -10,8 +10,10 @@ import pytest
 
 from roisearch import bounds
 from sim.ruler_fleet import Aircraft, expected_of_first, fly_together
+from sim.trials.campaign import Job
 from sim.trials.cli import main
-from sim.trials.fleet import strip_path
+from sim.trials.fleet import FleetCampaign, strip_path
+from sim.trials.fleet_cli import report_of
 
 WORDS = [
     "--searchers",
@@ -46,7 +48,7 @@ def test_nobody_is_sooner_than_the_bound_and_two_are_sooner_than_one(once: Path)
     assert expected["fleet", "2"] < expected["fleet", "1"]
     page = (once / "FLEET.md").read_text(encoding="utf-8")
     assert "1 priors of 1 are complete" in page
-    assert "below strips: met" in page
+    assert "below strips over 1 priors: met" in page
 
 
 def test_a_campaign_that_was_cut_goes_on_to_the_same_numbers(once: Path, tmp_path: Path) -> None:
@@ -61,6 +63,24 @@ def test_a_campaign_that_was_cut_goes_on_to_the_same_numbers(once: Path, tmp_pat
         for each in (once, folder)
     ]
     assert rows[0] == rows[1]
+
+
+def test_what_flies_over_fewer_priors_is_compared_over_those_alone() -> None:
+    campaign = FleetCampaign(searchers=(2,), trials=2, seed=7, slow=1)
+    took = {("bound", "1"): (80.0, 200.0), ("bound", "2"): (40.0, 150.0), ("fleet", "1"): (100.0, 900.0),
+            ("fleet", "2"): (50.0, 400.0), ("strips", "2"): (70.0, 800.0),
+            ("independent", "2"): (60.0, 0.0)}  # fmt: skip
+    results = {
+        job: {"expected": took[job.planner, job.fov][job.trial - 7], "timing": {"slowest_ms": 1.0}}
+        for job in campaign.jobs()
+    }
+    assert len(results) == 11
+    page = report_of(campaign, results, "command")
+    assert "| 2 | independent | 1 | 60.0 | 0.600 | 1.500 | 1.0 |" in page
+    assert "| 2 | fleet | 2 | 225.0 | 0.450 | 2.368 | 1.0 |" in page
+    assert "2 searchers, below independent over 1 priors: met" in page
+    results[Job("fleet", "fleet", "2", 7)]["expected"] = 61.0
+    assert "2 searchers, below independent over 1 priors: MISSED" in report_of(campaign, results, "command")
 
 
 def test_looks_of_all_are_merged_and_none_counts_twice() -> None:

@@ -29,12 +29,13 @@ pytestmark = pytest.mark.timeout(400)
 
 
 def test_a_short_soak_ends_without_a_violation() -> None:
-    words = ["soak", "--flights", "2", "--seed", "2", "--faults", "4", "--jobs", "2"]
+    words = ["soak", "--flights", "2", "--seed", "4", "--faults", "4", "--jobs", "2"]
     done = subprocess.run(
         [sys.executable, "-m", "sim", *words, "--verbose"], cwd=REPOSITORY, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "violations" in done.stdout
+    assert "3 aircraft" in done.stdout  # one flight of one, and one of three
 
 
 def test_a_seed_is_a_flight_and_every_kind_of_fault_comes() -> None:

@@ -42,7 +42,7 @@ def assemble_all(
     first = searches[0]
     remembered = retrace_all(journal.path, first, view.curve.add)
     if remembered:
-        count, pos = sum(len(each.ids) for each in remembered.values()), 100 * first.record.pos
+        count, pos = sum(len(each.names) for each in remembered.values()), 100 * first.record.pos
         log.info("resumed: %d reports of the earlier run, POS %.1f %%", count, pos)
     if moved := view.settings.search.regions_moved:
         first.common.redraw_by(Redrawing(moved, first.grid.searchable, view.named))

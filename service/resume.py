@@ -101,11 +101,11 @@ def retrace(entry: Entry, search: Search) -> None:
 
 @dataclass(frozen=True)
 class Remembered:
-    """What an intake has to know of an earlier run of the same search: the ids that count as known, in their order, and
-    the last rows of reports, to whose passes the next ones may belong."""
+    """What an intake has to know of an earlier run of the same search: the names of the reports that count as known, in
+    their order, each with its captured_at, and the last rows of reports, to whose passes the next ones may belong."""
 
     journal: Path
-    ids: tuple[str, ...]
+    names: tuple[tuple[str, float], ...]
     recent: tuple[Entry, ...]
 
     def tell(self, intake: Intake) -> None:
@@ -114,8 +114,8 @@ class Remembered:
             with understanding(self.journal, entry.seq, ReportRow.kind):
                 assert isinstance(entry.said, ReportRow)
                 intake.recall(entry.said)
-        intake.remember(self.ids)
-        intake.accepted = len(self.ids)
+        intake.remember(self.names)
+        intake.accepted = len(self.names)
 
 
 @dataclass(frozen=True)
@@ -148,19 +148,19 @@ def retrace_all(
 
     `told` hears the time of each row and the POS after it.
     """
-    ids: dict[str, dict[str, None]] = {}
+    names: dict[str, dict[str, float]] = {}
     recent: dict[str, deque[Entry]] = {}
     for entry in read_entries(journal, ReportRow, VerdictRow, NewsRow, WithdrawnRow, RegionsRow):
         with understanding(journal, entry.seq, entry.said.kind):
             retrace(entry, search)
         if isinstance(entry.said, ReportRow):
-            ids.setdefault(entry.aircraft, {})[entry.said.id] = None
+            names.setdefault(entry.aircraft, {})[entry.said.name] = entry.said.captured_at
             lately = recent.setdefault(entry.aircraft, deque())
             lately.append(entry)
             while lately[0].time < entry.time - HISTORY_S:
                 lately.popleft()
         told(entry.time, search.record.pos)
-    return {name: Remembered(journal, tuple(ids[name]), tuple(recent[name])) for name in ids}
+    return {name: Remembered(journal, tuple(names[name].items()), tuple(recent[name])) for name in names}
 
 
 def replay(
@@ -173,14 +173,14 @@ def replay(
     whether or not the service was killed meanwhile. Returns how many reports there were."""
     remembered = remembered_of(retrace_all(journal, search, told), journal)
     remembered.tell(intake)
-    return len(remembered.ids)
+    return len(remembered.names)
 
 
 def remembered_of(all_: dict[str, Remembered], journal: Path, whose: Whose = ALONE) -> Remembered:
     """What the intake of one aircraft has to know of them."""
     own = [all_[name] for name in sorted(all_) if whose.owns(name)]
     recent = sorted((entry for each in own for entry in each.recent), key=lambda entry: entry.seq)
-    return Remembered(journal, tuple(name for each in own for name in each.ids), tuple(recent))
+    return Remembered(journal, tuple(name for each in own for name in each.names), tuple(recent))
 
 
 def why_over(journal: Path) -> str:

@@ -21,6 +21,7 @@ from service.drawing import RegionsRow
 from service.errors import shown
 from service.evidence.found import IN_95_PERCENT, Found
 from service.evidence.observe import FramePose, Observation
+from service.evidence.reports import ANY_SOURCE, name_of_frame
 from service.geometry import Cell, LatLon
 from service.mission.states import Event, State
 from service.news.bearing import FieldNews, NewsRole
@@ -241,19 +242,25 @@ class ReportRow:
     observation: Observation | None
 
     @property
-    def id(self) -> str:
-        """The report's own name."""
-        return str(self.report["id"])
+    def name(self) -> str:
+        """What tells the report from all others of its aircraft."""
+        return name_of_frame(str(self.report["id"]), str(self.report.get("source", ANY_SOURCE)))
 
     @property
     def key(self) -> str:
         """What keeps a report from being written twice."""
-        return f"report {self.id}"
+        return f"report {self.name}"
 
     @property
     def captured(self) -> float:
         """When the frame was taken, in the service's clock."""
         return self.pose.time
+
+    @property
+    def captured_at(self) -> float:
+        """When that was, as the report says; not a number where an early journal does not tell."""
+        told = self.report.get("captured_at")
+        return float(told) if isinstance(told, int | float) else math.nan
 
     def body(self) -> dict[str, Any]:
         pose, known = self.pose, math.isfinite(self.pose.heading_deg)

@@ -26,7 +26,6 @@ from service.demo import DemoWorld
 from service.doors import Doors, open_doors
 from service.errors import BadInput
 from service.evidence.cover import sensors_over
-from service.evidence.reports import OrderReceipt
 from service.evidence.sensors import Profile
 from service.ground.words import of_the_ground
 from service.http import Door, open_door
@@ -34,6 +33,7 @@ from service.journal import Journal
 from service.lockstep import Lockstep
 from service.mavlink import LinkError, MavlinkSettings, Vehicle, check_links, read_signing_key
 from service.mavlink.url import LinkUrl, parse_url
+from service.mission.mission import Mission
 from service.mission.states import FINAL, State
 from service.outlet import whatever_the_terminal_does
 from service.progress import set_up_logging, show
@@ -282,6 +282,14 @@ def _lockstep(settings: Settings) -> Lockstep | None:
     return Lockstep.create(settings.speedup) if settings.mock and settings.speedup > 1.0 else None
 
 
+async def _end(mission: Mission, order: str) -> None:
+    """Give the order that ends a mission; one that cannot be brought home is left to who has it."""
+    receipt = await mission.order(order)
+    if receipt.refused and order != "leave":
+        log.warning("%s%s: leave", mission.called, receipt.refused)
+        await mission.order("leave")
+
+
 class Service:
     """A search from its first process to the last file it leaves."""
 
@@ -383,7 +391,7 @@ class Service:
     async def _run_squad(self, squad: Squad, journal: Journal) -> None:
         """Run the missions beside the display; a signal asks them to return, a second one ends them at once."""
         loop = asyncio.get_running_loop()
-        orders: set[asyncio.Task[OrderReceipt]] = set()
+        orders: set[asyncio.Task[None]] = set()
 
         def stop(name: str) -> None:
             if orders:
@@ -395,7 +403,7 @@ class Service:
                 order = "home" if mission.flight.began and not stays else "leave"
                 said = "%s%s: %s (once more to leave the aircraft to its autopilot)"
                 log.warning(said, mission.called, name, order)
-                orders.add(asyncio.create_task(mission.order(order)))
+                orders.add(asyncio.create_task(_end(mission, order)))
 
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, stop, number.name)

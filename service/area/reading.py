@@ -126,7 +126,7 @@ def _collect(document: Document, where: Where, notes: list[str], faults: list[st
         here = Where(where.source, item.label)
         wrong: list[str] = []
         if not guard(where, functools.partial(take, parts, item, here), wrong):
-            if item.guessed:
+            if item.guessed and item.properties["role"] != "exclude":  # which is believed to be kept to
                 item.dropped = True
                 notes += [f"{each.rstrip('.')}; left out" for each in wrong]
             else:

@@ -45,12 +45,19 @@ _POINTS: tuple[tuple[str, str], ...] = (
         "launch",
     ),
 )
-_POLYGONS: tuple[tuple[str, str], ...] = (
+_NEVER: tuple[tuple[str, str], ...] = (
     (
-        r"no ?(fly|flying|flight|drones?)( ?zones?)?|do not fly|nfz|tfr|exclusions?|excluded?|keep ?out|hazards?"
-        r"|danger(ous)?|avoid|restrict(ed|ion|ions)|prohibited|forbidden|obstacles?"
-        r"|flugverbot\w*|sperr(zone|gebiet|bereich|fl[aä]che)n?|gesperrt|gefahr\w*|hindernis(se)?"
-        r"|interdit\w*|vietat[oa]|divieto|pericol\w*|prohibid[oa]|peligro",
+        r"no ?(fly|flying|flight|drones?)( ?zones?)?|do not fly|nfz|tfr|exclusions?|excluded?|keep ?out"
+        r"|flugverbot\w*|sperr(zone|gebiet|bereich|fl[aä]che)n?",
+        "exclude",
+    ),
+)
+"""What nobody says of anything but ground that is not to be flown over, however it is drawn."""
+_POLYGONS: tuple[tuple[str, str], ...] = (
+    *_NEVER,
+    (
+        r"hazards?|danger(ous)?|avoid|restrict(ed|ion|ions)|prohibited|forbidden|obstacles?"
+        r"|gesperrt|gefahr\w*|hindernis(se)?|interdit\w*|vietat[oa]|divieto|pericol\w*|prohibid[oa]|peligro",
         "exclude",
     ),
     (r"prior|probable|likely|high probability|poa|wahrscheinlich\w*", "prior"),
@@ -177,6 +184,8 @@ def _take(document: Document, item: Item, searched: bool, by_hint: bool, nameles
         return _take_polygon(document, item, searched, by_hint, nameless)
     if kind == "Point":
         return _take_point(document, item)
+    if _forbids(document, item):
+        return False
     if "Line" in kind:
         _left_out(document, item, 'a line says nothing by itself; give it "role": "prior" and a width_m')
     else:
@@ -229,6 +238,8 @@ def _take_point(document: Document, item: Item) -> bool:
     elif what == "launch" or "sigma_m" in known:
         known["role"] = "launch" if what == "launch" else "prior"
         document.notes.append(f"{item.label}: taken as {_said(known['role'])}")
+    elif _forbids(document, item):
+        return False
     elif number(known.get("radius")):
         _left_out(
             document, item, "a circle that GeoJSON keeps as a point with a radius; draw it as a polygon"
@@ -237,6 +248,18 @@ def _take_point(document: Document, item: Item) -> bool:
     else:
         _left_out(document, item, 'a point of no known name; give it "role": "prior", "ipp" or "launch"')
         return False
+    return True
+
+
+def _forbids(document: Document, item: Item) -> bool:
+    """Whether a thing that is no polygon is called ground that is not to be flown over: nobody must believe that it
+    is kept to."""
+    if _meaning(_NEVER, item, item.hints) is None:
+        return False
+    document.faults.append(
+        f"{item.label}: its name says that it is not to be flown over, and a {item.geometry['type']} does not say "
+        'where; draw it as a Polygon, or give it another name, or a "role"'
+    )
     return True
 
 

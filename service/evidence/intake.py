@@ -14,6 +14,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import sqlite3
 import time
 from collections import OrderedDict
@@ -24,6 +25,7 @@ from service.area import Grid
 from service.clock import Clock
 from service.drawing import RegionsRow
 from service.entries import as_json, of_aircraft
+from service.errors import shown
 from service.evidence.counts import Counts
 from service.evidence.moments import Moments
 from service.evidence.observe import FramePose, Observation, Reading, Unreadable, observe
@@ -49,8 +51,12 @@ PIECE, PIECE_S = (
 )  # most reports in one transaction, and most seconds to work out what they mean: a hit
 # behind a large batch does not wait for all of it, nor does the flight for a camera's geometry
 MOST_WAITING = 20_000
-MOST_IDS = 200_000  # what is older than these, the journal itself knows
+MOST_KNOWN = 200_000  # what is older than these, the journal itself knows
 _MOST_CHARACTERS = 200
+_SAME_S = 1e-3  # what is sent again says the same time
+ANOTHER_FRAME = (
+    "it was taken in before, for a frame of another time; give every frame its own id, after a restart too"
+)
 
 
 class Intake:
@@ -77,7 +83,8 @@ class Intake:
         self.placed: Callable[[], bool] = lambda: True
         """Whether the telemetry has told any position of the aircraft so far."""
         self.counts = Counts()
-        self._ids: OrderedDict[str, None] = OrderedDict()
+        self._known: OrderedDict[str, float] = OrderedDict()
+        """Of the reports taken in, by their names, when their frames were taken, as they said."""
         self._waiting: list[WaitingReport] = []
         self._working: asyncio.Task[None] | None = None
 
@@ -144,12 +151,12 @@ class Intake:
             receipts.append(each.receipt)
         return receipts
 
-    def remember(self, ids: Iterable[str]) -> None:
-        """Ids that an earlier run of the same search has counted."""
-        for name in ids:
-            self._ids[name] = None
-        while len(self._ids) > MOST_IDS:
-            self._ids.popitem(last=False)
+    def remember(self, frames: Iterable[tuple[str, float]]) -> None:
+        """Names of reports that have been taken in, as an earlier run of the same search may have, each with its
+        captured_at."""
+        self._known.update(frames)
+        while len(self._known) > MOST_KNOWN:
+            self._known.popitem(last=False)
 
     def recall(self, row: ReportRow) -> None:
         """Take up the passes that a report of an earlier run of the same search belongs to; rows come in their order.
@@ -236,15 +243,24 @@ class Intake:
                 raise JournalLost(f"the journal {self.journal.path} cannot be written: {error}") from error
             raise
         self.passes.settle()
-        self.remember(new)
+        self.remember((name, each.report.captured_at) for name, (each, *_) in new.items())
         for (each, reading, observation), is_new in zip(new.values(), fresh, strict=True):
             if is_new:
                 self._believe(each, reading, observation)
             else:
                 repeated.append(each)
         for each in repeated:
-            each.settle(Receipt(id=each.report.id, status="duplicate"))
+            each.settle(self._again(each.report))
         await self._redraw()
+
+    def _again(self, report: Report) -> Receipt:
+        """The receipt of a report whose name is known; a frame that only took the name of another is lost, and that is
+        told."""
+        reason = ""
+        if abs(self._known.get(report.name, math.nan) - report.captured_at) > _SAME_S:
+            reason = ANOTHER_FRAME
+            self.counts.refuse(self.clock.now(), report, f"id {shown(report.id)}: {reason}")
+        return Receipt(id=report.id, status="duplicate", reason=reason)
 
     async def _redraw(self) -> None:
         """Go on with other regions of interest, if some are ready, once they are in the journal."""
@@ -263,7 +279,7 @@ class Intake:
 
         In a thread: a frame with hundreds of detections takes a second, in which the flight has its turns.
         """
-        unread = [each for each in piece if each.report.id not in self._ids and self._placed(each)]
+        unread = [each for each in piece if each.report.name not in self._known and self._placed(each)]
 
         def read() -> int:
             enough = time.perf_counter() + PIECE_S
@@ -300,7 +316,7 @@ class Intake:
         rows: list[tuple[float, str, str, str]] = []
         for each in piece:
             report, reading = each.report, each.reading
-            if report.id in self._ids or report.id in new:
+            if report.name in self._known or report.name in new:
                 repeated.append(each)
                 continue
             if isinstance(reading, Unreadable):
@@ -321,7 +337,7 @@ class Intake:
             observation = None
             if report.usable:
                 observation = observe(self.passes, report.source, each.captured, reading)
-            new[report.id] = (each, reading, observation)
+            new[report.name] = (each, reading, observation)
             row = _row(report, each.pose, each.captured, observation)
             key = f"{row.key} of {self.search.aircraft}" if self.search.aircraft else row.key
             rows.append((self.clock.now(), row.kind, key, as_json(of_aircraft(row, self.search.aircraft))))
@@ -345,7 +361,7 @@ class Intake:
         self.moments.measure()
         now, room = self.clock.now(), MOST_WAITING - len(self._waiting)
         for each in waiting:
-            if each.report.id in self._ids:
+            if each.report.name in self._known:
                 continue
             if room <= 0:
                 self._refuse(

@@ -222,6 +222,15 @@ _AS_DECLARED: list[JsonValue] = [
 """What the values of a report may be goes by the units that it declares."""
 
 
+ANY_SOURCE = "detector"
+"""The source of a report that names none."""
+
+
+def name_of_frame(id: str, source: str) -> str:
+    """What tells a report from all others of its aircraft: two detectors may both count from 1."""
+    return id if source == ANY_SOURCE else f"{id} from {source}"
+
+
 class Report(DoorModel):
     """One camera frame, looked at by a detector. No detections means that nothing was seen: send it all the same,
     it is what clears the ground."""
@@ -229,8 +238,12 @@ class Report(DoorModel):
     model_config = ConfigDict(json_schema_extra={"allOf": _AS_DECLARED})
 
     version: Literal[1] = Field(default=1, description="of this schema")
-    id: str = Field(min_length=1, max_length=128, description="unique; a repeated id is not counted twice")
-    source: str = Field(default="detector", max_length=64, description="which detector or camera")
+    id: str = Field(
+        min_length=1,
+        max_length=128,
+        description="of this frame alone among those of the source; a repeated id is not counted twice",
+    )
+    source: str = Field(default=ANY_SOURCE, max_length=64, description="which detector or camera")
     aircraft: str | None = Field(
         default=None,
         max_length=24,
@@ -314,6 +327,11 @@ class Report(DoorModel):
         """Where a person finds a picture of a detection; None when there is none, or it has not been kept."""
         offered = (seen.image, seen.thumbnail, self.image)
         return next((each for each in offered if each is not None and _ADDRESS.fullmatch(each)), None)
+
+    @property
+    def name(self) -> str:
+        """What tells it from all other reports of its aircraft."""
+        return name_of_frame(self.id, self.source)
 
     @property
     def captured_s(self) -> float:
@@ -426,7 +444,8 @@ class Receipt(DoorModel):
     )
     reason: str = Field(
         default="",
-        description="why it was refused, or why an accepted report has no looks or not all its hits",
+        description="why it was refused, why an accepted report has no looks or not all its hits, or that a duplicate "
+        "is another frame under a known id, which is lost",
     )
     looks: int = Field(default=0, description="cells that this frame counted as a look for")
     hits: int = Field(default=0, description="cells of those with a hit")

@@ -34,6 +34,12 @@ STOPPING = ("hold", "return", "home", "finish", "abort", "leave")
 """Orders that go out first and are journalled after. What was ordered before one of them counts no more."""
 OFFERED = ("hold", "resume", "return", "launch", "replace", "finish")
 """Orders that a page has a button for."""
+_HOMEWARD = {
+    "return": ("the operator asked to return", None),
+    "finish": (FINISHED, FINISHED),
+    "home": (SIGNAL, ""),
+}
+"""Orders that bring home what an earlier process has left in the air: why, and whether that settles the search."""
 _MAY_LAUNCH = (State.READY, State.GROUNDED, State.YIELDED, State.HOLDING)
 _BEFOREHAND = ("hold", "return", "finish")  # mean something to an aircraft that is not heard yet
 STICKS = 0.15  # part of their way, from which on deflected sticks are a hand on them
@@ -54,11 +60,10 @@ def ordered(order: Order, look: Look) -> Iterator[Wish]:
         yield Hold("operator", ASKED)  # it is at home: a flag must not fly it after that
         yield Answer(order.ticket)
         return
-    if order.command in ("return", "finish") and _left_aloft(look):
-        finish = order.command == "finish"
-        why = FINISHED if finish else "the operator asked to return"
-        home = Happen(Event.HOMEWARD, ASKED, stopped=why, searched=finish)
-        then = (home, Settle(why)) if finish else (home,)
+    if order.command in _HOMEWARD and _left_aloft(look):
+        why, settles = _HOMEWARD[order.command]
+        home = Happen(Event.HOMEWARD, why, stopped=why, searched=order.command == "finish")
+        then = (home,) if settles is None else (home, Settle(settles))
         yield Pending(order.command, EnterGuided(), then, order.ticket)
         return
     if why := _refusal(order.command, look):
@@ -92,6 +97,8 @@ def ordered(order: Order, look: Look) -> Iterator[Wish]:
             return
         case "finish":
             wish = Happen(Event.FINISH, ASKED, stopped=FINISHED, searched=True)
+        case "home" if (state, Event.RETURN) not in TABLE:  # nobody of ours has it, and it is left to who has
+            wish = Happen(Event.ABORT, SIGNAL, stopped=SIGNAL)
         case "home":  # and the process ends, whatever is left to search
             yield Happen(Event.RETURN, SIGNAL, stopped=SIGNAL)
             yield Settle("")

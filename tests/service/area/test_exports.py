@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 import shapely
@@ -24,7 +25,8 @@ from service.area.geojson import Where
 from service.area.roles import ROLES
 from service.area.words import ROLE_NAMES
 from service.cli import main
-from tests.service.area.files import box, collection, feature, parse, point, polygon
+from service.errors import BadInput
+from tests.service.area.files import at, box, collection, feature, parse, point, polygon
 
 EXPORTS = Path(__file__).parent / "exports"
 ALL = sorted(EXPORTS.iterdir())
@@ -144,6 +146,28 @@ def test_what_was_only_guessed_is_left_out_where_it_cannot_be() -> None:
     assert area.priors == ()
     assert noted(area, '"home"', "km from the area", "left out")
     assert noted(area, '"clue"', "entirely outside", "left out")
+
+
+def open_line(*places: tuple[float, float]) -> dict[str, Any]:
+    return {"type": "LineString", "coordinates": [at(*place) for place in places]}
+
+
+@pytest.mark.parametrize(
+    ("geometry", "said"),
+    [
+        (polygon([at(0, 0), at(60, 60), at(60, 0), at(0, 60), at(0, 0)]), "crosses or touches itself"),
+        (open_line((0, 0), (60, 0), (60, 60)), "a LineString does not say where; draw it as a Polygon"),
+        (point(at(0, 0)), "a Point does not say where; draw it as a Polygon"),
+    ],
+)
+def test_ground_that_is_never_flown_over_by_its_name_is_kept_to_or_refused(
+    geometry: dict[str, Any], said: str
+) -> None:
+    """A hospital, drawn by a slip as a bow-tie, was left out with one note among others, and flown over."""
+    field = feature(polygon(box(-200, -200, 200, 200)))
+    with pytest.raises(BadInput, match=f'"No fly zone hospital".*{said}'):
+        parse(collection(field, feature(geometry, name="No fly zone hospital")))
+    assert parse(collection(field, feature(point(at(0, 0)), name="Hazard: wire"))).exclusions == ()
 
 
 def test_a_description_sets_only_what_is_ours() -> None:

@@ -13,11 +13,11 @@ import pytest
 
 from roisearch import FieldOfView
 from service.clock import Clock
-from service.evidence.intake import Intake
+from service.evidence.intake import ANOTHER_FRAME, Intake
 from service.evidence.mask import Sensor
 from service.evidence.moments import Moments
 from service.evidence.observe import FramePose
-from service.evidence.reports import Detection, Report
+from service.evidence.reports import Detection, Receipt, Report
 from service.journal import Journal, JournalLost, read_rows
 from tests.service.reporting import FRAME, Ground
 
@@ -97,6 +97,36 @@ def test_detectors_of_two_aircraft_that_count_alike_are_not_taken_for_one(
         return [receipt.status for receipt in receipts]
 
     assert asyncio.run(send()) == ["accepted", "accepted", "duplicate", "duplicate"]
+
+
+def test_two_detectors_of_an_aircraft_that_count_alike_are_not_taken_for_one(
+    make: Callable[..., Intake],
+) -> None:
+    intake = make()
+    both = [frame("1").model_copy(update={"source": source}) for source in ("rgb", "thermal")]
+
+    async def send() -> list[str]:
+        return [(await intake.submit(each)).status for each in (*both, *both)]
+
+    assert asyncio.run(send()) == ["accepted", "accepted", "duplicate", "duplicate"]
+    assert intake.counts.refused == 0
+
+
+def test_a_detector_that_counts_from_one_again_is_told_that_its_frames_are_lost(
+    make: Callable[..., Intake],
+) -> None:
+    """Its id was known, and so was a hit thrown away: the page said that the detector was silent."""
+    intake = make()
+
+    async def send() -> list[Receipt]:
+        first = [frame(str(number)) for number in range(3)]
+        later = [each.model_copy(update={"captured_at": each.captured_at + 0.5}) for each in first]
+        return await intake.submit_all([*first, *first, *later])
+
+    receipts = asyncio.run(send())
+    assert [each.status for each in receipts] == ["accepted"] * 3 + ["duplicate"] * 6
+    assert [each.reason for each in receipts[3:]] == [""] * 3 + [ANOTHER_FRAME] * 3
+    assert "every frame its own id" in intake.counts.silence(time.time(), 10.0)
 
 
 def test_a_report_that_could_not_be_written_may_be_sent_again(make: Callable[..., Intake]) -> None:

@@ -173,6 +173,27 @@ def test_what_was_left_in_the_air_is_not_left_hovering_until_its_battery_is_empt
     assert (talk.state, talk.doing()) == (State.RETURNING, ReturnToLaunch())
 
 
+@pytest.mark.parametrize("left", [State.SEARCHING, State.RETURNING])
+def test_who_ends_the_process_brings_home_what_it_has_found_in_the_air_or_leaves_it_to_its_pilot(
+    left: State,
+) -> None:
+    """systemctl stop, in READY: it was answered and nothing done, and the search began as the position came back."""
+    talk = restarted(left, fix=1)
+    assert (talk.state, talk.core.doing) == (State.READY, None)
+    talk.on(Order("home", 7))
+    assert talk.doing() == EnterGuided()
+    talk.shows(fix=3, in_control=True)
+    talk.done()
+    talk.tick()
+    standing = talk.core.standing
+    assert (standing.state, standing.settled, standing.searched) == (State.RETURNING, True, False)
+    for where in ({"guided": False, "mode": "LOITER"}, ON_GROUND):
+        talk = restarted(left, **where)
+        talk.on(Order("home", 7))
+        assert talk.state in (State.ABORTED, State.DONE)
+        assert not [effect for effect in talk.wanted if isinstance(effect, MOVES)]
+
+
 def test_a_restart_twice_over_does_not_forget_nor_repeat_itself() -> None:
     first = restarted(State.YIELDED)
     standing = replace(first.core.standing)

@@ -68,7 +68,7 @@ def decode(outputs: Sequence[NDArray[np.generic]], layout: str) -> Raw:
             table = table.T
             return _by_class(table[:, :4], table[:, 4:])
         return _by_class(table[:, :4], table[:, 5:] * table[:, 4:5])
-    except (IndexError, ValueError) as error:
+    except (IndexError, ValueError, StopIteration) as error:
         shapes = ", ".join(str(list(each.shape)) for each in outputs)
         raise BadInput(f"the model's outputs {shapes} are not of the layout '{layout}'") from error
 
@@ -85,6 +85,8 @@ def _lists(outputs: Sequence[NDArray[np.generic]]) -> Raw:
     """Boxes are what has four columns, labels what is whole, scores the other."""
     flat = [np.asarray(each) for each in outputs]
     boxes = next(each for each in flat if each.shape[-1:] == (4,) and each.ndim > 1).reshape(-1, 4)
+    if not len(boxes):  # as most frames of a search
+        return Raw(boxes.astype(np.float64), np.zeros(0), np.zeros(0, dtype=np.int64))
     others = [each.reshape(-1) for each in flat if each.size == len(boxes) and each.size != boxes.size]
     labels = next(each for each in others if np.issubdtype(each.dtype, np.integer))
     scores = next(each for each in others if np.issubdtype(each.dtype, np.floating))

@@ -30,6 +30,7 @@ from service.evidence.targets import not_the_target, only_targets
 
 _FAR_CORNER = 10.0  # times the range: so far from the camera may a corner of an outline be
 _NO_HEADING = "where the nose pointed is not known, and the camera turns with it"
+_NO_LEAN = "how the aircraft leaned is not known, and the camera leans with it"
 _NOTHING = Footprint(np.empty((0, 2), dtype=np.int64), *np.empty((2, 0)), *np.empty((2, 0)))
 
 
@@ -65,8 +66,8 @@ class CameraSensor:
 
     def footprint(self, pose: FramePose) -> Footprint:
         """The cells that a frame taken from `pose` shows, as the settings have the camera."""
-        if not math.isfinite(pose.heading_deg):
-            return _NOTHING.in_vain(_NO_HEADING)
+        if why := self._unknown(pose):
+            return _NOTHING.in_vain(why)
         return self._footprint(self.sight(pose))
 
     def read(self, pose: FramePose, report: Report) -> Reading:
@@ -78,11 +79,10 @@ class CameraSensor:
         report, ignored = only_targets(report, self.classes)
         note = not_the_target(ignored, self.classes) if ignored else ""
         outline, gimbal = report.footprint, report.gimbal
-        if not math.isfinite(pose.heading_deg):
-            if outline is not None and all(seen.box is None for seen in report.detections):
-                pose = replace(pose, heading_deg=0.0)  # the outline tells where it looked
-            elif gimbal is None or gimbal.relative_to == "vehicle":
-                return Reading(_NOTHING.in_vain(_NO_HEADING), {}, note=note)
+        if why := self._unknown(pose, gimbal):
+            if outline is None or any(seen.box is not None for seen in report.detections):
+                return Reading(_NOTHING.in_vain(why), {}, note=note)
+            pose = replace(pose, heading_deg=0.0)  # the outline tells where it looked
         sight = self.sight(pose, gimbal, report.intrinsics)
         footprint = self._footprint(sight) if outline is None else self._outlined(outline, sight.position[:2])
         if (
@@ -105,6 +105,15 @@ class CameraSensor:
             footprint.cells[looked], footprint.p_tp[looked], footprint.p_tn[looked], self.frame.cell_m,
         )  # fmt: skip
         return Reading(footprint, hits, tuple(self._sighting(*spots[i], report) for i in on_it), note)
+
+    def _unknown(self, pose: FramePose, gimbal: Gimbal | None = None) -> str:
+        """Why it is not known where the camera looked from `pose`, turned as the report's gimbal says, or nothing."""
+        if gimbal is not None and gimbal.relative_to == "earth":
+            return ""
+        if not math.isfinite(pose.heading_deg):
+            return _NO_HEADING
+        leans = gimbal is not None or not self.mount.stabilised
+        return _NO_LEAN if leans and not math.isfinite(pose.pitch_deg + pose.roll_deg) else ""
 
     def sight(
         self, pose: FramePose, gimbal: Gimbal | None = None, intrinsics: Intrinsics | None = None

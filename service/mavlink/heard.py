@@ -43,6 +43,10 @@ class _Told:
     """The vehicle's own time of it, in whatever unit; 0: not told."""
 
 
+_STAMPED_WHEN_SET = frozenset({"HOME_POSITION", "GPS_GLOBAL_ORIGIN"})
+"""PX4 stamps them with the time at which the place was set, however often it tells it."""
+
+
 class Heard:
     """The memory of one vehicle's messages. `base` is what does not come from them: heartbeat, control, readiness."""
 
@@ -101,7 +105,7 @@ class Heard:
             return False
         before = self._told.get((name, number))
         stamp = getattr(message, "time_boot_ms", 0) or getattr(message, "time_usec", 0)
-        if before is not None and stamp and stamp == before.stamp:
+        if before is not None and stamp and stamp == before.stamp and name not in _STAMPED_WHEN_SET:
             return False  # said again, and no younger than it was
         if name == "GLOBAL_POSITION_INT":
             fields = {**fields, **self._over_the_ground(fields, now)}

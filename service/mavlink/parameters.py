@@ -1,6 +1,7 @@
 """The few parameters that are read: how high above home the autopilot flies home by itself, and how it may move.
 
-PARAM_REQUEST_READ by name, asked for again while it is not answered; who does not know a name does not answer.
+PARAM_REQUEST_READ by name, asked for again while it is not answered, seldom after the first times; who does not know a
+name does not answer. One that is changed in flight is told to all, and taken over.
 ArduCopter 4.7 has other names than before, and metres where there were centimetres: RTL_ALT_M for RTL_ALT, WP_ACC for
 WPNAV_ACCEL, and so on. ArduCopter has no parameter for the fastest that it can be told to fly: WP_SPD and WPNAV_SPEED
 are what it flies at until it is told. PX4 climbs and sinks to a waypoint by MPC_Z_V_AUTO_UP and MPC_Z_V_AUTO_DN (from
@@ -15,9 +16,10 @@ from dataclasses import dataclass
 
 _AGAIN_S = 2.0
 _MOST = 5
+_LATER_S = 60.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Wanted:
     """One value: the field of `Telemetry` it is for, the names by autopilot with what one of the parameter is in the
     field's unit, and the range that it can have. A name stands for another; of several values for a field the lowest
@@ -61,27 +63,29 @@ MOTION = (
 
 
 class Parameters:
-    """Asks for each value that is wanted until it is told."""
+    """Asks for each value that is wanted until it is told, and hears when it changes."""
 
     def __init__(self, autopilot: str, wanted: Iterable[Wanted]) -> None:
-        self._open = [each for each in wanted if autopilot in each.names]
+        self._wanted = [each for each in wanted if autopilot in each.names]
         self._autopilot = autopilot
-        self._lowest: dict[str, float] = {}
+        self._told: dict[Wanted, float] = {}
         self._asked, self._at = 0, -math.inf
 
     def due(self, now: float) -> list[str]:
         """The names to ask for now."""
-        if not self._open or self._asked >= _MOST or now - self._at < _AGAIN_S:
+        open_ = [each for each in self._wanted if each not in self._told]
+        if not open_ or now - self._at < (_AGAIN_S if self._asked < _MOST else _LATER_S):
             return []
         self._asked, self._at = self._asked + 1, now
-        return [name for each in self._open for name in each.names[self._autopilot]]
+        return [name for each in open_ for name in each.names[self._autopilot]]
 
     def read(self, name: str, value: float) -> tuple[str, float] | None:
         """A PARAM_VALUE as the field it is for and the lowest told for that; None: nobody asked, or it cannot be so."""
-        for each in self._open:
+        for each in self._wanted:
             unit = each.names[self._autopilot].get(name)
             if unit is not None and each.least <= value * unit <= each.most:
-                self._open.remove(each)
-                self._lowest[each.field] = min(value * unit, self._lowest.get(each.field, math.inf))
-                return each.field, self._lowest[each.field]
+                self._told[each] = value * unit
+                return each.field, min(
+                    told for other, told in self._told.items() if other.field == each.field
+                )
         return None

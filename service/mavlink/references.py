@@ -2,7 +2,8 @@
 
 Home, the origin of the estimator's frame, and sea level (the altitude of home that the two altitudes of a position
 imply) are all told by the vehicle, and all of them can move in flight: a barometer's correction, another geoid, a new
-home by a ground station. One message is not believed; what two in a row say is an event with both values.
+home by a ground station. One message is not believed; what two in a row say is an event with both values. PX4 tells a
+new origin once only: that is believed where the position has jumped with it.
 """
 
 from __future__ import annotations
@@ -45,27 +46,47 @@ class References:
             return self._look("home", t.home, now)
         if message == "GPS_GLOBAL_ORIGIN":
             moved = self._look("origin", t.origin, now)
-            return None if moved is None else replace(moved, position_too=self._went_along(moved))
-        if message == "GLOBAL_POSITION_INT":
-            self._note_jump(t, now)
+            if moved is None:
+                return self._with_the_position(now)
+            return replace(moved, position_too=self._went_along(moved))
+        if (
+            message == "GLOBAL_POSITION_INT"
+            and self._note_jump(t, now)
+            and (moved := self._with_the_position(now))
+        ):
+            return moved
         if message == "GLOBAL_POSITION_INT" and math.isfinite(t.alt_home_m):
             place = Home(0.0, 0.0, t.alt_amsl_m - t.alt_home_m)
             return self._look("sea level", place, now)
         return None
 
-    def _note_jump(self, t: Telemetry, now: float) -> None:
-        """How far the position is from where the speeds of the last two say it should be."""
+    def _with_the_position(self, now: float) -> ReferenceMoved | None:
+        """An origin that was told anew once, where the position has jumped with it."""
+        if "origin" not in self._moved:
+            return None
+        moved = ReferenceMoved(
+            now, "origin", self._known["origin"], self._moved["origin"][0], position_too=True
+        )
+        if not self._went_along(moved):
+            return None
+        self._known["origin"] = self._moved.pop("origin")[0]
+        return moved
+
+    def _note_jump(self, t: Telemetry, now: float) -> bool:
+        """Whether the position is far from where the speeds of the last two say it should be."""
         last, self._last = self._last, (t, now)
         if last is None or not 0.0 < now - last[1] <= _LONGEST_STEP_S:
-            return
+            return False
         before, seconds = last[0], now - last[1]
         east, north = offset_m((before.lat, before.lon), (t.lat, t.lon))
         pace_north, pace_east = (
             0.5 * (before.velocity_ned_mps[axis] + t.velocity_ned_mps[axis]) * seconds for axis in (0, 1)
         )
         jump = (east - pace_east, north - pace_north)
-        if math.hypot(*jump) > _MOVED_M:
+        jumps = math.hypot(*jump) > _MOVED_M
+        if jumps:
             self._jumps.append((now, *jump))
+        return jumps
 
     def _went_along(self, moved: ReferenceMoved) -> bool:
         """Whether the position has lately jumped as far, and to the same side, as the origin has moved."""

@@ -139,7 +139,9 @@ class Handover:
             return
         why, before = look.helm.unfit(t, look.seen.others), self._unfit
         self._unfit = why
-        if why and not self._between:
+        if why and left_aloft and look.helm.no_way_home(t, look.seen.others):
+            yield Hold("operator", why)
+        elif why and not self._between:
             yield GiveUp(why)
         elif why:
             if not before:
@@ -217,7 +219,10 @@ class Ready(Phase):
                 "it was on its way home: waiting until the aircraft is down, or hovers in the guided mode"
             )
         elif why := look.helm.unfit(t, look.seen.others):
-            yield GiveUp(why)
+            aloft = look.flight.flown and not down and look.helm.no_way_home(t, look.seen.others)
+            yield (
+                Hold("operator", why) if aloft else GiveUp(why)
+            )  # what flies is not left there until it falls
         elif down and terms.may_take_off and not order_needed(look):
             self._taking_off = True
             yield WaitReady()

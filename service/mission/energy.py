@@ -30,6 +30,7 @@ _SLOWEST_MPS = 0.5  # slower over ground counts as not getting home at all
 _WORN = frozenset({"low", "critical", "emergency", "failed", "unhealthy"})
 _STUCK_PERCENT = 10.0  # a level that stands still while so much is used is no level
 _RISE_PERCENT = 10.0  # nor is one that has risen by more, in flight
+_TAKEN_BACK_S = 10.0  # for so long after a fall all at once it may have been a single wrong word
 _LANDING_PERCENT = 3.0  # is left, beyond what a landing takes, when one begins that is not at home
 _FIRST_WORD_S = 15.0  # so long after the first look the battery may not have been told yet
 
@@ -40,6 +41,7 @@ class Level:
     def __init__(self) -> None:
         self._percent: float | None = None
         self._at = self._since = 0.0
+        self._fell_from, self._fell_at = 0.0, -math.inf
         self.doubt = ""
         """Why what is told cannot be true: it has stood still for too long, or has risen; as the end of a sentence."""
 
@@ -51,6 +53,14 @@ class Level:
         Nor is one believed that is higher by more than `_RISE_PERCENT` than the last: no battery is charged in flight.
         """
         before = self._percent
+        if told is not None and before is not None and before - told > _CORRECTION_PERCENT:
+            self._fell_from, self._fell_at = before, now
+        if (
+            told is not None
+            and now - self._fell_at <= _TAKEN_BACK_S
+            and told <= self._fell_from + _RISE_PERCENT
+        ):
+            before = self._fell_from  # of a fall all at once that is taken back no more is believed
         rises = told is not None and before is not None and told > before + _RISE_PERCENT
         believed = None if rises else told
         if believed is not None and believed != self._percent:

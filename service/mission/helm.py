@@ -88,7 +88,11 @@ class Helm:
     def unfit(self, t: Telemetry, others: Sequence[Other]) -> str:
         """Why this aircraft is not the one to begin with, or nothing: it is too far away, must not land where it would,
         or is another mission's."""
-        return self.too_far(t) or self._no_home(t, others) or self.traffic.twin(t, others)
+        return self.no_way_home(t, others) or self.traffic.twin(t, others)
+
+    def no_way_home(self, t: Telemetry, others: Sequence[Other]) -> str:
+        """Why where this aircraft would land is no place to come home to, or nothing."""
+        return self.too_far(t) or self._no_home(t, others)
 
     def grounded(self, seen: Situation) -> str:
         """Why this aircraft must not take off as it stands there, or nothing."""
@@ -153,9 +157,9 @@ class Helm:
 
     def returns_clear(self, start: LatLon, t: Telemetry) -> bool:
         """Whether the autopilot's own return from a place, at the height flown there or the present one if that
-        is lower, is clear of the ground."""
+        is lower, is clear of the ground. One that does not tell how high that goes is not relied on to climb."""
         up = min(self.heights.up(t), self.heights.home_m + self.heights.over_m(start))
-        clearance = self.heights.return_clearance(start, up, self.return_m(t))
+        clearance = self.heights.return_clearance(start, up, t.return_height_m or 0.0)
         return clearance >= self._flight.clearance_m
 
     def of_the_ground(self, t: Telemetry) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
+from service.geometry import offset_m
 from service.mavlink.events import (
     AnotherService,
     ArmedChanged,
@@ -113,7 +114,9 @@ class VehicleWatch:
     def _moved(self, event: ReferenceMoved, look: Look) -> Iterator[Wish]:
         """What follows from it is computed anew wherever it is used; a person must know why heights change."""
         before, after = event.before.alt_amsl_m, event.after.alt_amsl_m
-        said = f"{event.what} has moved: {before:.0f} to {after:.0f} m above sea level"
+        far = math.hypot(*offset_m((event.before.lat, event.before.lon), (event.after.lat, event.after.lon)))
+        aside = f"{far:.0f} m to the side, " if far >= 1.0 else ""
+        said = f"{event.what} has moved: {aside}{before:.0f} to {after:.0f} m above sea level"
         yield Note(said, 30)
         yield Tell(f"search: {said}", 4)
         if event.position_too and look.standing.state in (*MOVING, State.HOLDING):

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Callable
 from typing import Any
 
 from sim.autopilot.dialect import NAN, M
 from sim.autopilot.host import Host
+from sim.autopilot.vehicle import Point
 
 _STICKS_S = 1.0  # sticks that were heard longer ago are none
 _GPS = M.MAV_SYS_STATUS_SENSOR_GPS
@@ -207,6 +209,7 @@ def home_position(a: Host) -> Any | None:
         0.0,
         0.0,
         0.0,
+        _set_at(a, home),
     )
 
 
@@ -214,7 +217,13 @@ def gps_global_origin(a: Host) -> Any:
     """GPS_GLOBAL_ORIGIN: the origin of the local frame."""
     origin = a.vehicle.origin
     latitude, longitude = a.vehicle.frame.to_e7(origin.north, origin.east)
-    return M.MAVLink_gps_global_origin_message(latitude, longitude, _mm(a.vehicle.amsl(origin.up)))
+    altitude = _mm(a.vehicle.amsl(origin.up))
+    return M.MAVLink_gps_global_origin_message(latitude, longitude, altitude, _set_at(a, origin))
+
+
+def _set_at(a: Host, place: Point) -> int:
+    """PX4's stamp of home and origin is the time at which they were set: another one for another place only."""
+    return 1 + zlib.crc32(repr(place).encode()) if a.firmware.flavor.autopilot == M.MAV_AUTOPILOT_PX4 else 0
 
 
 def vfr_hud(a: Host) -> Any:

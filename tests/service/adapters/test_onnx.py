@@ -149,6 +149,14 @@ def test_each_layout_of_outputs_means_the_same_boxes() -> None:
         assert raw.classes[best] == kind
 
 
+def test_an_image_without_anything_is_no_fault_of_the_layout() -> None:
+    """Most frames of a search are; the detector ended at the first one."""
+    raw = decode([np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int64)], "lists")
+    assert (raw.boxes.shape, raw.scores.size, raw.classes.size) == ((0, 4), 0, 0)
+    with pytest.raises(BadInput, match="not of the layout 'lists'"):
+        decode([np.zeros((2, 4), np.float32), np.zeros(2, np.float32)], "lists")
+
+
 def test_a_box_is_placed_in_a_picture_of_other_proportions_than_the_networks(tmp_path: Path) -> None:
     model = Model(write_model(tmp_path / "red.onnx"), wishes=Wishes(threshold=0.5))
     (seen,) = model.look(picture(128, 64, red_at=(64, 16)).repeat(2, axis=0).repeat(2, axis=1))

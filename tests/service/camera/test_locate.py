@@ -177,6 +177,23 @@ def test_attitude_turns_a_fixed_camera_and_not_a_stabilised_one() -> None:
     assert left.cells[left.counts][:, 1].mean() < level.cells[level.counts][:, 1].mean() - 0.5
 
 
+def test_a_camera_that_leans_with_the_aircraft_sees_nothing_while_nobody_knows_how_that_leans() -> None:
+    """At 60 m the ground in view lay up to 20 m from where it was booked."""
+    untold = pose(15, 15, roll_deg=math.nan, pitch_deg=math.nan)
+    fixed = CameraSensor(**{**vars(SENSOR), "mount": Mount(-60.0, stabilised=False)})
+    for seen in (
+        fixed.footprint(untold),
+        fixed.read(untold, report()).footprint,
+        SENSOR.read(untold, report(gimbal={"pitch_deg": -60.0, "relative_to": "vehicle"})).footprint,
+    ):
+        assert not seen.counts.any()
+        assert "leaned is not known" in seen.why_not
+    assert SENSOR.footprint(untold).counts.any()
+    assert SENSOR.read(
+        untold, report(gimbal={"pitch_deg": -90.0, "relative_to": "earth"})
+    ).footprint.counts.any()
+
+
 def test_a_drawn_footprint_covers_what_it_covers() -> None:
     corners = FRAME.to_latlon([[9.5, 9.5], [9.5, 12.0], [11.5, 12.0], [11.5, 9.5]])
     seen = SENSOR.read(pose(15, 15), report(footprint=corners.tolist())).footprint

@@ -86,6 +86,23 @@ def test_the_height_of_the_autopilots_own_return_is_asked_for_until_it_is_told(
     assert not [m for m in rig.sent[before:] if m.get_type() == "PARAM_REQUEST_READ"]
 
 
+def test_what_is_not_answered_is_asked_for_seldom_and_for_ever_and_what_changes_is_heard() -> None:
+    """The first seconds on a bad radio decided it for the whole flight, and so did what stood there at first."""
+    parameters = Parameters("ardupilot", [RETURN_HEIGHT])
+    asked = [now for now in range(0, 200) if parameters.due(float(now))]
+    assert asked == [0, 2, 4, 6, 8, 68, 128, 188]
+    assert parameters.read("RTL_ALT", 1500.0) == ("return_height_m", 15.0)
+    assert parameters.due(1000.0) == []
+    assert parameters.read("RTL_ALT", 6000.0) == ("return_height_m", 60.0)
+    px4 = Parameters("px4", MOTION)
+    for name, value, lowest in (
+        ("MPC_Z_VEL_MAX_UP", 3.0, 3.0),
+        ("MPC_Z_V_AUTO_UP", 2.0, 2.0),
+        ("MPC_Z_V_AUTO_UP", 4.0, 3.0),
+    ):
+        assert px4.read(name, value) == ("most_climb_mps", lowest)
+
+
 def test_nothing_is_asked_for_that_nobody_uses_and_what_is_no_height_is_not_taken() -> None:
     rig = flying()
     rig.run(5.0)

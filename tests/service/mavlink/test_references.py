@@ -12,12 +12,14 @@ from service.mavlink.events import ReferenceMoved
 from .peer import ALT, GROUND, LAT, LON, Rig
 
 
-def home(rig: Rig, lat: float, alt: float) -> None:
+def home(rig: Rig, lat: float, alt: float, set_at: int = 0) -> None:
     """HOME_POSITION from somewhere else."""
     place = (round(lat * 1e7), round(LON * 1e7), round(alt * 1000))
     rig.say(
         rig.peer.pack(
-            mavlink.MAVLink_home_position_message(*place, 0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0)
+            mavlink.MAVLink_home_position_message(
+                *place, 0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, set_at
+            )
         )
     )
 
@@ -36,6 +38,41 @@ def test_home_that_moves_is_told_with_both_values_once_two_messages_agree() -> N
     home(rig, LAT + 0.001, GROUND + 47.0)
     home(rig, LAT + 0.001, GROUND + 47.0)
     assert rig.of(ReferenceMoved)[-1].after.lat == LAT + 0.001
+
+
+def test_a_home_that_is_stamped_with_when_it_was_set_is_told_as_well() -> None:
+    """PX4 repeats it with one stamp, and what has the stamp of the one before was not listened to."""
+    rig = Rig().flying()
+    rig.peer.home = False
+    home(rig, LAT, GROUND + 47.0, set_at=77)
+    home(rig, LAT, GROUND + 47.0, set_at=77)
+    assert moved(rig) == [("home", GROUND, GROUND + 47.0)]
+
+
+@pytest.mark.parametrize("first", ["origin", "position"])
+def test_an_origin_that_is_told_once_is_believed_where_the_position_jumps_with_it(first: str) -> None:
+    """PX4 tells it when it changes, and not again."""
+    rig = Rig().flying()
+    rig.positioning = False
+
+    def origin(lat: float) -> None:
+        rig.say(
+            rig.peer.pack(
+                mavlink.MAVLink_gps_global_origin_message(round(lat * 1e7), round(LON * 1e7), 489_000, 5)
+            )
+        )
+
+    def position(lat: float) -> None:
+        rig.now += 0.2
+        place = (round(lat * 1e7), round(LON * 1e7), round(ALT * 1000), 20_000, 0, 0, 0, 9000)
+        rig.say(rig.peer.pack(mavlink.MAVLink_global_position_int_message(rig.peer.boot_ms(rig.now), *place)))
+
+    origin(LAT)
+    position(LAT)
+    for what in ("origin", "position") if first == "origin" else ("position", "origin"):
+        assert rig.of(ReferenceMoved) == []
+        (origin if what == "origin" else position)(LAT + 0.001)
+    assert [(event.what, event.position_too) for event in rig.of(ReferenceMoved)] == [("origin", True)]
 
 
 def test_a_single_home_that_is_nonsense_is_no_event() -> None:

@@ -151,6 +151,19 @@ def test_a_level_that_rises_in_flight_is_not_believed() -> None:
     assert level.doubt == ""
 
 
+def test_a_single_wrong_word_of_the_level_is_taken_back() -> None:
+    """A garbled message said 5 %, and the 76 % after it were never believed again in that flight."""
+    level = Level()
+    assert level.update(76.0, 0.1, 0.0) == 76.0
+    assert level.update(5.0, 0.1, 1.0) == 5.0  # which may be true, so it counts at once
+    assert level.update(76.0, 0.1, 2.0) == 76.0
+    assert level.doubt == ""
+    assert level.update(75.0, 0.1, 12.0) == 75.0
+    assert level.update(5.0, 0.1, 20.0) == 5.0
+    assert level.update(76.0, 0.1, 40.0) < 5.0  # and not one that has stood for so long
+    assert level.doubt == "has risen in flight"
+
+
 def test_a_level_that_is_counted_down_leads_home_and_is_told() -> None:
     near = WayHome(0.0, 30.0, 0.0)
     reckoned = Energy(66.0, 0.1, near, told=False)

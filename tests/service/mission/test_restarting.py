@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from service.mavlink.events import ArmedChanged, ModeChanged
+from service.mavlink.events import ArmedChanged, Home, ModeChanged
 from service.mavlink.modes import ModeKind
 from service.mission.departing import AS_LEFT
 from service.mission.effects import (
@@ -27,7 +27,7 @@ from service.mission.phase import RETRY_S
 from service.mission.standing import Standing
 from service.mission.states import Event, State
 from service.rows import TransitionRow
-from tests.service.mission.flown import LEFT_US, ON_GROUND, Talk
+from tests.service.mission.flown import LEFT_US, ON_GROUND, Talk, place
 from tests.service.mission.test_departing import MOVES, STEPS, at_once
 
 LAST = Standing(state=State.RETURNING, why_stopped="searched to POS 97.0 %", searched=True)
@@ -192,6 +192,15 @@ def test_who_ends_the_process_brings_home_what_it_has_found_in_the_air_or_leaves
         talk.on(Order("home", 7))
         assert talk.state in (State.ABORTED, State.DONE)
         assert not [effect for effect in talk.wanted if isinstance(effect, MOVES)]
+
+
+@pytest.mark.parametrize("hovers", [{}, {"fix": 1}], ids=["trusted", "in doubt"])
+def test_what_flies_far_from_its_home_of_now_is_held_and_not_given_up(hovers: dict[str, Any]) -> None:
+    """Home was moved in flight: the run was over with the restart, and the aircraft in nobody's hands."""
+    talk = restarted(State.SEARCHING, home=Home(*place(2000.0, 2000.0), 400.0), **hovers)
+    assert talk.state == State.HOLDING
+    assert "launch point" in talk.core.standing.why
+    assert talk.doing() == EnterGuided(there=True) if hovers else EnterGuided()
 
 
 def test_a_restart_twice_over_does_not_forget_nor_repeat_itself() -> None:

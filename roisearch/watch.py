@@ -171,6 +171,10 @@ class LookCounts:
         """Which cells were looked at, flat, bool [cells]."""
         return np.asarray(self._tally.any(axis=1))
 
+    def hit(self) -> NDArray[np.int64]:
+        """The cells in which something was reported, flat, int [n]."""
+        return np.flatnonzero(self._tally[:, 1] > 0)
+
     def raised(self, cells: NDArray[np.int64], weights: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which of `cells` [k], flat indices, are more probable, beside the others, than before the looks.
 

@@ -24,7 +24,7 @@ def worth_a_look(search: Search, path: Sequence[Cell]) -> frozenset[Cell]:
 
 def _worth(search: Search, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether cells [k, 2] are at least as likely as the mean, and can be seen: bool [k]."""
-    mean = search.belief.total / max(1, int(np.count_nonzero(search.grid.searchable)))
+    mean = 1.0 / max(1, int(np.count_nonzero(search.grid.searchable)))
     hidden = search.common.overlooked.cells[cells[:, 0], cells[:, 1]]
     return np.asarray((search.belief.mass_at(cells) >= mean) & ~hidden)
 
@@ -39,7 +39,7 @@ def pays_to_hover(search: Search, cells: Sequence[Cell]) -> bool:
     if search.grid.walk is None or search.expected_s is None:
         return False
     took_s = search.settings.sensor.hover_look_s + search.motion.corner_seconds(180)
-    least = took_s / max(took_s, search.expected_s) / float(search.fov.p_tp[0]) * search.belief.total
+    least = took_s / max(took_s, search.expected_s) / float(search.fov.p_tp[0])
     hit = [cell for cell in cells if search.sightings.near(cell)]
     return bool(hit) and float(search.belief.mass_at(np.array(hit)).max()) >= least
 

@@ -21,7 +21,7 @@ from roisearch.detection import DetectionRecord
 from roisearch.directions import direction_between
 from roisearch.motion_fit import Flown
 from roisearch.place import Place
-from roisearch.planners.base import Hasty, InSeconds, Planner
+from roisearch.planners.base import Expects, Hasty, InSeconds, Planner
 from roisearch.planners.ending import EndingPlanner
 from roisearch.planners.ending.settings import EndingSettings
 from roisearch.walk import MOST_S
@@ -448,7 +448,7 @@ class Search:
         endurance = self.reach.endurance(left) if left is not None and known and near else None
         deadline, planner = self.settings.search.deadline_s, self.planner
         decision = self.ending.plan(thought, state, self._rng, deadline_s=deadline, endurance=endurance)
-        self.expected_s = -decision.value if isinstance(self.planner, InSeconds) else None
+        self.expected_s = planner.expected_s if isinstance(planner, Expects) else None
         if isinstance(planner, Hasty) and planner.hasty:
             self._begin_draft(planner, thought, state, decision)
         return decision

@@ -7,8 +7,8 @@ a point field of view, the multi-cell bound with another one. With a point field
 it is set against the teleporting reference (`roisearch.bounds`). Both sides are averaged over the same
 number of draws, seeded alike. With `--motion` all of it is in seconds of flight: the default is then the planner of
 tours, with its settings, a planner that knows no motion flies its cells with the same aircraft, E[T] is restricted to
-the time of as many straight cells, and the release bound in seconds is what it is set against. The results are kept
-in the folder: the same command goes on where it stopped.
+the time of a straight flight over as many cells as the map has, and the release bound in seconds is what it is set
+against. The results are kept in the folder: the same command goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -54,6 +54,7 @@ KEY = ("variant", "fov", "p_tn", "equal", "side", "motion", "deadline_ms", "stop
 """The fields that tell one result from another."""
 FIELDS = (*KEY, "expected", "reference", "steps", "first_cpu_ms", "first_wall_ms",
           *(f"cpu_ms_{p:g}" for p in SHARES), *(f"wall_ms_{p:g}" for p in SHARES))  # fmt: skip
+LEAST_SIDE = 20
 COLOURS = ("#b0b0b0", "#d08c3a", "#1f6f8b", "#7a3b8f", "#3b8f4a")
 Row = dict[str, str]
 
@@ -117,9 +118,9 @@ def field_of_view(name: str, p_tn: float) -> FieldOfView:
     return made[name](P_TP, p_tn)
 
 
-def cap_of(motion: Motion) -> float:
-    """The seconds to which E[T] is restricted."""
-    return PAPER_STEPS * motion.cell_m / motion.speed_mps
+def cap_of(motion: Motion, cells: int) -> float:
+    """The seconds to which E[T] is restricted: those of a straight cell for each on the map."""
+    return cells * motion.cell_m / motion.speed_mps
 
 
 def reference_time(
@@ -127,8 +128,8 @@ def reference_time(
 ) -> float:
     """E[T] of what the result is set against, which `reference_named` says; see the module's text."""
     if motion is not None:
-        times, found = release_seconds(prior, PAPER_START, P_TP, motion, cap_of(motion))
-        return expected_seconds(times, found, cap_of(motion))
+        times, found = release_seconds(prior, PAPER_START, P_TP, motion, cap_of(motion, prior.size))
+        return expected_seconds(times, found, cap_of(motion, prior.size))
     if not fov.is_point:
         return expected_time(multi_cell(prior, PAPER_START, fov, P_TP, PAPER_STEPS))
     if p_tn == 1.0:
@@ -160,7 +161,7 @@ def fly(variant: str, seed: int, draw: int, options: argparse.Namespace) -> Row:
         how = ruler_seconds.How(
             PAPER_START, fov=fov, steps=PAPER_STEPS, stop_below=options.stop_below, follow=follow
         )
-        expected = ruler_seconds.fly(planner, prior, motion, rng, how).expected(cap_of(motion))
+        expected = ruler_seconds.fly(planner, prior, motion, rng, how).expected(cap_of(motion, prior.size))
     first, others = planner.milliseconds()
     numbers = [expected, reference_time(prior, fov, options.p_tn, (seed, draw), motion)]
     clocks = [*first, *others[:, 0], *others[:, 1]]
@@ -297,6 +298,12 @@ def main(arguments: list[str]) -> int:
     try:
         if options.motion is not None and options.deadline_ms is not None:
             raise ValueError("a deadline is for steps; with --motion leave --deadline-ms out")
+        if options.motion is not None and options.fov != "point":
+            raise ValueError(f"in seconds there is a bound for a point field of view, not for {options.fov}")
+        if options.side < LEAST_SIDE:
+            raise ValueError(
+                f"the paper's priors need at least {LEAST_SIDE} cells on a side, not {options.side}"
+            )
         for variant in variants:
             planner_named(variant, field_of_view(options.fov, options.p_tn), motion_of(options)).warm_up()
     except ValueError as error:

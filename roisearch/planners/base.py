@@ -63,6 +63,14 @@ class InSeconds(Protocol):
 
 
 @runtime_checkable
+class Expects(Protocol):
+    """A planner that reckons how long its plan takes until the target is detected."""
+
+    expected_s: float
+    """By the plan of the last decision, in seconds from then; 0 before one."""
+
+
+@runtime_checkable
 class Hasty(Protocol):
     """A planner that keeps its plan from one decision to the next, and says when it had no time to make a good one."""
 

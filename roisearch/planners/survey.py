@@ -139,8 +139,9 @@ class SurveyPlanner:
     def _note_reports(self, belief: Belief) -> None:
         """Take up the cells whose reports stand, and drop those that were looked at in vain since."""
         if belief is not self._belief or belief.hits != self._hits:
-            if self._belief is not None and belief.hits != self._hits:
-                changed = np.flatnonzero(belief.weights != self._known)
+            if self._belief is None or belief.hits != self._hits:
+                first = self._belief is None  # another planner may have looked before, on an earlier flight
+                changed = self._looked.hit() if first else np.flatnonzero(belief.weights != self._known)
                 reported = changed[self._looked.raised(changed, belief.weights) & self._near(changed)]
                 self._reported.update(reported.tolist())
             self._known = belief.weights.copy()

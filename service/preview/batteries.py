@@ -25,7 +25,7 @@ from service.search import Search
 
 MOST = 8
 """More batteries than this are not flown ahead."""
-MOST_CELLS = 2500
+MOST_CELLS = 20_000
 HIGHER = (1.5, 2.0)
 """So many times as high it is tried whether fewer batteries would do."""
 
@@ -94,8 +94,9 @@ def _fly(search: Search, full_s: float, until: float, rng: np.random.Generator) 
         )
         rest = Endurance(endurance.remaining_s - now, endurance.home_s)
         decision = search.ending.plan(search.belief, state, rng, endurance=rest)
-        for cell in decision.path[:HEED]:
-            then = float(search.arrivals([*sim.cells[1:], cell], grid.start)[-1])
+        path = decision.path[:HEED]
+        times = search.arrivals([*sim.cells[1:], *path], grid.start)[-len(path) :]
+        for cell, then in zip(path, times.tolist(), strict=True):
             late = then + endurance.home_s[cell] > endurance.remaining_s
             if late:
                 break

@@ -119,8 +119,7 @@ class BaseView:
         cells = np.argwhere(self.search.common.overlooked.cells)
         if not len(cells):
             return []
-        belief = self.search.belief
-        shares = (belief.mass_at(cells) / belief.total).tolist()
+        shares = self.search.belief.mass_at(cells).tolist()
         places = [(float(lat), float(lon)) for lat, lon in frame.to_latlon(cells)]
         return [
             {"lat": lat, "lon": lon, "probability": share, "written": written((lat, lon), how)}

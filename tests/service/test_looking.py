@@ -13,7 +13,7 @@ from service.area.model import TargetMotion
 from service.config import Settings
 from service.evidence.observe import Observation, Sighting
 from service.geometry import Cell
-from service.looking import passed, pays_to_hover, place_in_sight, worth_a_look
+from service.looking import _worth, passed, pays_to_hover, place_in_sight, worth_a_look
 from service.search import Search
 from tests.service.mission.flown import CELL_M, GRID
 from tests.service.test_search import search
@@ -65,6 +65,17 @@ def test_what_one_aircraft_gives_up_the_others_do_not_fly_to_either() -> None:
     assert flown_in_vain(first, cell)
     assert second.planner is not before
     assert second.enough == first.enough < search().enough
+
+
+def test_a_look_is_worth_it_by_the_probability_however_much_was_looked_at_in_vain() -> None:
+    built = search()
+    cells = np.argwhere(GRID.searchable)
+    most = cells[np.argsort(built.belief.mass_at(cells))][len(cells) // 10 :]
+    for _ in range(2):
+        built.belief.observe(most, np.zeros(len(most), dtype=bool), 0.8, 0.99)
+    assert built.belief.total < 0.3
+    likely = built.belief.probability()[cells[:, 0], cells[:, 1]] >= 1.0 / len(cells)
+    np.testing.assert_array_equal(_worth(built, cells), likely)
 
 
 def reported(built: Search, cell: Cell) -> None:

@@ -117,6 +117,9 @@ def test_the_default_plans_the_end_of_a_battery_and_another_planner_does_not() -
         left = Left(home_s + 120.0, home_s + 120.0, home_s, 20.0, GRID.launch)
         decision = asyncio.run(built.decide(SearchState(far, "west", 8.0), (), left))
         assert ("the end of the battery" in decision.remark) is planned
+        assert (
+            built.expected_s is not None and built.expected_s > 10.0
+        ) is planned  # seconds, not what it will find
         calm = asyncio.run(built.decide(SearchState(far, "west", 8.0), (), long))
         assert "the end of the battery" not in calm.remark
         if planned:

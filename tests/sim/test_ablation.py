@@ -134,5 +134,10 @@ def test_in_seconds_the_parts_of_the_tour_stand_above_the_bound_in_seconds(
     assert "in seconds of flight, cells of 25 m, 8 m/s, 1.5 m/s2" in text
     assert ablation.main([*arguments, "--variants", "keep=0.5"]) == 2
     assert "'keep' is neither a planner nor one of the settings looks" in capsys.readouterr().err
-    assert ablation.main([*arguments, "--deadline-ms", "38"]) == 2
-    assert "leave --deadline-ms out" in capsys.readouterr().err
+    for words, said in (
+        (["--deadline-ms", "38"], "leave --deadline-ms out"),
+        (["--fov", "donut"], "there is a bound for a point field of view"),
+        (["--side", "5"], "at least 20 cells on a side, not 5"),
+    ):
+        assert ablation.main([*arguments, *words]) == 2
+        assert said in capsys.readouterr().err

@@ -88,6 +88,8 @@ class TourPlanner:
         self._heading = 0  # of the last decision's state
         self._drifted = 0  # how often the target has walked on since the tour was made
         self._turn = False  # whether the last spell was at the front
+        self.expected_s = 0.0
+        """Seconds until the target is expected to be detected, by the tour of the last decision; see `Expects`."""
         self.hasty = False
         """Whether the tour was made with fewer than its first spells of annealing; see `Hasty`."""
 
@@ -398,10 +400,11 @@ class TourPlanner:
         path = self._entered(self.settings.path) or [self._any_step(self._at, heading)]
         self._path = path
         hidden = self._unseen / belief.total
+        self.expected_s = desk.cost / self._mass if desk.size else 0.0
         return Decision(
             path=tuple(divmod(cell, cols) for cell in path),
             action=DIRECTIONS[self._direction(self._at, path[0])],
-            value=-desk.cost / self._mass if desk.size else 0.0,
+            value=-self.expected_s,
             effort=effort,
             unreachable=hidden,
             remark=remark_on(hidden),

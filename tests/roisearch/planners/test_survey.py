@@ -110,6 +110,22 @@ def test_it_goes_back_to_what_is_reported_and_resumes() -> None:
     assert set(undisturbed[10:]) <= set(rest)
 
 
+def test_a_survey_that_takes_over_knows_what_was_reported_before() -> None:
+    """On the next battery, or over other ground, it left the reported place out: that had been looked at."""
+    fov = FieldOfView.point(0.9, 0.99)
+    belief, rng = Belief(np.ones((12, 12))), np.random.default_rng(0)
+    belief.follow(LOOKED)
+    belief.observe([(5, 5)], True, 0.9, 0.99)
+    planner, path = make_planner("survey", fov=fov, motion=MOTION), []
+    state = SearchState((0, 0), "east")
+    for _ in range(12):
+        decision = planner.plan(belief, state, rng)
+        path.append(decision.path[0])
+        state = SearchState(path[-1], direction_between(state.cell, path[-1]))
+        belief.observe([path[-1]], path[-1] == (5, 5), 0.9, 0.99)
+    assert (5, 5) in path[:5]
+
+
 def test_a_survey_that_takes_over_goes_on_where_the_last_one_stopped() -> None:
     fov = FieldOfView.point(0.9, 0.99)
     prior = np.ones((12, 12))

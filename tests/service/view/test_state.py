@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
@@ -66,6 +67,8 @@ def test_cells_that_are_passed_in_vain_are_told_as_not_seen_from_the_air(tmp_pat
     assert view.state()["unseen"] == []
     row, col = search.place.cell
     search.common.overlooked.cells[row, col] = True
+    rest = np.argwhere(grid.searchable)
+    search.belief.observe(rest, np.zeros(len(rest), dtype=bool), 0.5, 0.9)  # what is left does not sum to 1
     (told,) = view.state()["unseen"]
     lat, lon = grid.frame.to_latlon([[row, col]])[0]
     assert (told["lat"], told["lon"]) == (lat, lon)

@@ -13,7 +13,10 @@ of a metres; the rounded way is shorter by 2 z - a than the one through the midd
 2. *Cell c is not reached before r_c seconds.* What is reached may be the middle of an arc, and so may be where the
    flight begins; both lie at most o metres from the middles of their cells, and a straight line between them is the
    shortest way: r_c = max(tau, (distance - 2 o) / v). The arc of a corner touches both legs z from the cell's
-   middle, so its own middle lies z (1 / cos b - tan b) from it, with b half of the angle between the legs.
+   middle, so its own middle lies z (1 / cos b - tan b) from it, with b half of the angle between the legs. Where
+   only four neighbours are flown to, c is so many moves away as rows and columns together, and none of them takes
+   less than tau by 1: r_c is at least moves tau as well. (Not the length of the moves less 2 o: a staircase is cut
+   at every step of it.)
 
 So put the looks into slots j = 1, 2, ... at the times j tau, a look at s into slot floor(s / tau): by 1 no two looks
 share a slot and the first has one, and by 2 no look at c comes before slot floor(r_c / tau). That is a legal order
@@ -60,11 +63,10 @@ def release_seconds(
         raise ValueError(f"seconds must be 0 or more and finite, not {seconds}")
     apart, off = least_between_looks(motion)
     row, col = np.indices(prior.shape)
-    if motion.diagonal:
-        away = motion.cell_m * np.hypot(row - start[0], col - start[1])
-    else:
-        away = motion.cell_m * (np.abs(row - start[0]) + np.abs(col - start[1]))
-    reached = np.maximum((away - 2.0 * off) / float(motion.pace.cruise.max()), apart)
+    down, right = np.abs(row - start[0]), np.abs(col - start[1])
+    line_s = (motion.cell_m * np.hypot(down, right) - 2.0 * off) / float(motion.pace.cruise.max())
+    moves = np.maximum(down, right) if motion.diagonal else down + right
+    reached = np.maximum(line_s, apart * np.maximum(moves, 1))
     slots = math.floor(seconds / apart + 1e-9)
     released = np.floor(reached / apart + 1e-9).astype(np.int64).ravel()
     found = greedy_looks(mass, released, np.ones(slots, dtype=np.int64), float(p_tp))

@@ -50,14 +50,33 @@ def lawnmower(
 
 def lane_runs(wanted: NDArray[np.bool_], flyable: NDArray[np.bool_], swath: int) -> NDArray[np.int64]:
     """The runs along rows, a swath apart: lane, first and last cell, int [runs, 3], by lane and then by cell."""
-    rows = wanted.shape[0]
-    tops = np.arange(0, rows, swath)
-    lanes = np.minimum(tops + (swath - 1) // 2, rows - 1)
-    seen = wanted if swath == 1 else np.logical_or.reduceat(wanted, tops, axis=0)
-    along = np.zeros((lanes.size, wanted.shape[1] + 2), dtype=np.int8)
-    along[:, 1:-1] = seen & flyable[lanes]
+    rows, cols = wanted.shape
+    along = np.zeros((rows, cols + 2), dtype=np.int8)
+    along[:, 1:-1] = lanes_over(wanted, flyable, swath)
     edges = np.argwhere(np.diff(along, axis=1))  # where a run begins, and behind its end, in turn
-    return np.stack([lanes[edges[::2, 0]], edges[::2, 1], edges[1::2, 1] - 1], axis=1).astype(np.int64)
+    return np.stack([edges[::2, 0], edges[::2, 1], edges[1::2, 1] - 1], axis=1).astype(np.int64)
+
+
+def lanes_over(wanted: NDArray[np.bool_], flyable: NDArray[np.bool_], swath: int) -> NDArray[np.bool_]:
+    """Where lanes along rows lead, bool [rows, cols]: through the middle of each swath, beside what is not flyable
+    there as near to it as can be, and once more where something wanted would not be seen."""
+    if swath == 1:
+        return wanted & flyable
+    rows, half = wanted.shape[0], (swath - 1) // 2
+    flown = np.zeros_like(wanted)
+    for top in range(0, rows, swath):
+        left, middle = wanted[top : top + swath].any(axis=0), min(top + half, rows - 1)
+        for row in sorted(range(top, min(top + swath, rows)), key=lambda row: abs(row - middle)):
+            flown[row] = left & flyable[row]
+            left = left & ~flown[row]
+    seen = np.zeros_like(wanted)
+    for row in range(rows):
+        seen[row] = flown[max(0, row - half) : row + half + 1].any(axis=0)
+    for row, col in np.argwhere(wanted & ~seen).tolist():
+        near = [each for each in range(max(0, row - half), min(rows, row + half + 1)) if flyable[each, col]]
+        if near:
+            flown[min(near, key=lambda each: abs(each - row)), col] = True
+    return flown
 
 
 def in_order(

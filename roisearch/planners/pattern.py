@@ -12,6 +12,7 @@ from roisearch.decision import Decision, Effort, SearchState
 from roisearch.fov import FieldOfView
 from roisearch.kernels.ground import cell_step, flood
 from roisearch.planners.base import Progress, Scene, World, any_move, remark_on
+from roisearch.planners.lanes import lanes_over
 from roisearch.planners.warm import warm_up
 from roisearch.regions import Regions
 
@@ -151,13 +152,10 @@ class CoveragePlanner(PatternPlanner):
         rows, cols = scene.ground.shape
         wanted = (belief.weights > 0.0).reshape(rows, cols)
         flyable = (scene.part.legal > 0).reshape(rows, cols)
-        half = (self._swath - 1) // 2
-        lanes: list[NDArray[np.int64]] = []
-        for number, top in enumerate(range(0, rows, self._swath)):
-            lane = min(top + half, rows - 1)
-            near = wanted[top : top + self._swath].any(axis=0)
-            along = np.flatnonzero(near & flyable[lane])
-            lanes.append(lane * cols + (along if number % 2 == 0 else along[::-1]))
+        flown, lanes = lanes_over(wanted, flyable, self._swath), list[NDArray[np.int64]]()
+        for row in range(rows):
+            along = np.flatnonzero(flown[row])
+            lanes.append(row * cols + (along if row // self._swath % 2 == 0 else along[::-1]))
         return np.concatenate(lanes)
 
 

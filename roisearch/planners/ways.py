@@ -120,14 +120,19 @@ def soonest(
 ) -> NDArray[np.int64]:
     """That of `orders`, flat cells to enter from `at`, which flies over `worth` [cells] soonest on average.
 
-    `heights` [cells] are those at which the cells are flown over; None: flat ground.
+    What an order does not lead over is found at its end at the earliest. `heights` [cells] are those at which the
+    cells are flown over; None: flat ground.
     """
+
+    total = float(worth.sum())
 
     def expected(order: NDArray[np.int64]) -> float:
         path = ways.joined(at, order, heading)
         times = motion.seconds(at, path, heading, ways.cols, heights)
+        if not path.size:
+            return 0.0
         cells, first = np.unique(path, return_index=True)
-        return float(worth[cells] @ times[first])
+        return float(worth[cells] @ times[first]) + (total - float(worth[cells].sum())) * float(times[-1])
 
     return min(orders, key=expected)
 

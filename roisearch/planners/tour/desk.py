@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from roisearch.kernels.records import Ints
 from roisearch.motion import Motion
 from roisearch.planners.tour.anneal import anneal
+from roisearch.planners.tour.landmarks import NO_LANDMARKS
 from roisearch.planners.tour.starts import PLAIN, by_rule, swept
 from roisearch.planners.tour.tour import Prices, Tour, cost_of, insert_best, settle
 
@@ -23,10 +24,11 @@ def prices_of(
     cols: int,
     is_open: bool,
     heights: NDArray[np.float64] | None = None,
+    far: NDArray[np.int32] = NO_LANDMARKS,
 ) -> Prices:
     """What steps and corners cost by `motion`: a corner, what it takes beside the straight line at full speed.
 
-    `heights` are those at which the cells are flown over, float [cells]; None: flat ground.
+    `heights` are those at which the cells are flown over, float [cells]; None: flat ground. `far`: see `Prices`.
     """
     pace = motion.pace
     lengths = [pace.diagonal_m if d % 2 else pace.straight_m for d in range(8)]
@@ -43,6 +45,7 @@ def prices_of(
         is_open=is_open,
         diagonal=motion.diagonal,
         climb=motion.climb(heights),
+        far=far,
     )
 
 

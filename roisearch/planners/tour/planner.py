@@ -18,6 +18,7 @@ from roisearch.motion import Motion
 from roisearch.planners.base import Progress, remark_on
 from roisearch.planners.lanes import lawnmowers
 from roisearch.planners.tour.desk import MOST_LOOKS, Desk, prices_of
+from roisearch.planners.tour.landmarks import NO_LANDMARKS, landmarks
 from roisearch.planners.tour.levels import keep_up
 from roisearch.planners.tour.settings import TourSettings
 from roisearch.planners.tour.tour import Prices
@@ -81,6 +82,7 @@ class TourPlanner:
         self._seconds = 0.0  # of one spell, lately
         self._known: NDArray[np.float64] = np.zeros(0)
         self._unseen = 0.0  # mass that cannot be looked at
+        self._findable = 0.0  # what all looks that would ever be planned may find
         self._path: list[int] = []  # what the last decision gave
         self._at = self._since = self._idle = (
             0  # the cell; cells since looks were ranked; spells without gain
@@ -135,12 +137,14 @@ class TourPlanner:
                 raise ValueError(f"{name} has the shape {values.shape}, the map {ground.shape}")
         if self._visibility is not None:
             self._p *= self._visibility.ravel()
+        self._p *= reach.ravel()
         self._hidden = np.flatnonzero(~part.viewable.ravel())
+        self._far = NO_LANDMARKS
         self._desk = Desk(self.settings.looks + 2 * BATCH, rows * cols, self._prices())
 
     def _prices(self) -> Prices:
         ways = self._ways
-        return prices_of(self._motion, ways.allowed, ways.cols, ways.is_open, self._flat_heights)
+        return prices_of(self._motion, ways.allowed, ways.cols, ways.is_open, self._flat_heights, self._far)
 
     @property
     def _flat_heights(self) -> NDArray[np.float64] | None:
@@ -170,13 +174,14 @@ class TourPlanner:
         for cell in flown:
             expected[cells == cell] *= 1.0 - self._p[cell]
         actual = belief.weights[cells]
+        self._findable += float((actual - self._known[cells]) @ self._found_of(cells))
         self._known[cells] = actual
-        self._settle(belief)
+        self._settle()
         wrong = (np.abs(actual - expected) > 0.25 * expected) & self._reach.ravel()[cells]
         for cell in cells[wrong].tolist():
             self._expect(belief, cell)
         if wrong.any():
-            self._settle(belief)
+            self._settle()
             self._idle = 0
         self._since += len(flown)
         if desk.size < self.settings.looks - BATCH:
@@ -200,14 +205,13 @@ class TourPlanner:
         self._idle = 0
         flown = self._fly(state.cell[0] * cols + state.cell[1])
         desk.stand(state.cell, direction_index(state.heading))
-        self._known = belief.weights.copy()
-        self._unseen = float(belief.weights[self._hidden].sum())
+        self._take_over(belief)
         cells = desk.cells()
         nth = _repeats(cells)
         desk.tour.worth[desk.tour.order[1 : desk.size + 1]] = (
             self._p[cells] * belief.weights[cells] * (1.0 - self._p[cells]) ** nth
         )
-        self._settle(belief)
+        self._settle()
         self._since += len(flown)
         worth = self._p * belief.weights
         again = np.flatnonzero((worth > self._least) & self._reach.ravel() & (desk.tour.first < 0))
@@ -215,15 +219,25 @@ class TourPlanner:
             if desk.space <= 0:
                 break
             desk.insert(cell, float(worth[cell]))
-        self._settle(belief)
+        self._settle()
         if desk.size < self.settings.looks - BATCH:
             self._carry_on(belief)
 
-    def _settle(self, belief: Belief) -> None:
-        total = belief.total - belief.outside * belief.total - self._unseen
-        self._mass = max(total, 1e-300)
-        self._desk.prices.rest[0] = max(0.0, total - self._desk.worth)
+    def _found_of(self, cells: Ints | slice) -> NDArray[np.float64]:
+        """What part of the mass of `cells` can be found: of what more looks than are ever planned would still miss,
+        nothing is the sooner for a short tour."""
+        return 1.0 - (1.0 - self._p[cells]) ** MOST_LOOKS
+
+    def _settle(self) -> None:
+        self._mass = max(self._findable, 1e-300)
+        self._desk.prices.rest[0] = max(0.0, self._findable - self._desk.worth)
         self._desk.settle()
+
+    def _take_over(self, belief: Belief) -> None:
+        """Know the whole belief."""
+        self._known = belief.weights.copy()
+        self._unseen = float(belief.weights[self._hidden].sum())
+        self._findable = float(belief.weights @ self._found_of(slice(None)))
 
     def _touched(self, belief: Belief, now: Mark, before: Mark) -> list[NDArray[np.int64]] | None:
         """Where `belief` may differ from what is known, cells [k, 2] each; None if that is another map altogether.
@@ -261,10 +275,10 @@ class TourPlanner:
                 desk.tour.worth[looks[k]] = worth
                 if worth > 2.0 * known:  # reported: perhaps it is better looked at sooner
                     desk.remove(int(desk.tour.place[looks[k]]))
-                    self._settle(belief)
+                    self._settle()
                     desk.insert(cell, worth)
             elif worth > self._least and desk.space > 0:
-                self._settle(belief)
+                self._settle()
                 desk.insert(cell, worth)
             worth *= 1.0 - float(self._p[cell])
 
@@ -272,19 +286,21 @@ class TourPlanner:
 
     def _load(self, belief: Belief, state: SearchState, until: float) -> None:
         """Take over the whole belief and make a tour of the best looks."""
-        self._known = belief.weights.copy()
-        self._unseen = float(belief.weights[self._hidden].sum())
+        self._take_over(belief)
         self._path = []
         self._at = state.cell[0] * belief.shape[1] + state.cell[1]
         self._idle = self._since = self._drifted = 0
         self.hasty = False
+        if not self._ways.is_open and not len(self._far):
+            self._far = landmarks(self._ways.allowed, self._ways.cols, self._at, until)
+            self._desk.prices = self._desk.prices._replace(far=self._far)
         desk = self._desk
         desk.clear()
         desk.stand(state.cell, direction_index(state.heading))
         self._reserve = self._ranked(belief)
         self._least = 0.0
         self._add(belief, self.settings.looks)
-        self._settle(belief)
+        self._settle()
         if desk.size:
             self._anneal_first(desk.arrange(until), until)
 
@@ -366,7 +382,7 @@ class TourPlanner:
         if self._reserve.size == 0:
             return
         self._add(belief, BATCH)
-        self._settle(belief)
+        self._settle()
         self._idle = max(0, self._idle - self.settings.patience // 4)
 
     # Thinking and deciding

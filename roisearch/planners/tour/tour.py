@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from roisearch.kernels.compiled import inlined, kernel
 from roisearch.kernels.motion import Climb, upright_seconds
 from roisearch.kernels.records import Floats, Ints
+from roisearch.planners.tour.landmarks import STRAIGHT, apart
 
 Links = NDArray[np.int32]
 Bits = NDArray[np.uint8]
@@ -29,7 +30,8 @@ Bits = NDArray[np.uint8]
 NOWHERE = 16
 """The bearing of a leg from a cell to itself, out and back."""
 BLOCKED = 3.0
-"""A leg that is not free is priced as so many times its length: there is a way around, of unknown length."""
+"""A leg that is not free is priced as so many times its length at least: there is a way around, which is known to be
+longer where there are landmarks."""
 
 
 class Tour(NamedTuple):
@@ -63,7 +65,8 @@ class Prices(NamedTuple):
     """Seconds: of a step along each of four axes from north-south on, of corners by 22.5 degrees [9], of a `jump`'s
     corner where a leg changes from diagonal to straight; `rest` [1] is the mass left when the tour ends.
 
-    `allowed` [cells] has bit d set where a cell can be left in direction d. `climb` is what heights cost.
+    `allowed` [cells] has bit d set where a cell can be left in direction d. `climb` is what heights cost. `far` [n,
+    cells] are distances from landmarks; see `tour.landmarks`.
     """
 
     axis: Floats
@@ -75,6 +78,7 @@ class Prices(NamedTuple):
     is_open: bool
     diagonal: bool
     climb: Climb
+    far: Links
 
 
 @inlined
@@ -136,6 +140,9 @@ def leg(row: int, col: int, to_row: int, to_col: int, prices: Prices) -> float:
         seconds += climbing(row, col, to_row, to_col, both, prices)
     if not prices.is_open and not is_free(row, col, to_row, to_col, both, prices):
         seconds = BLOCKED * (seconds + prices.axis[0] + prices.axis[2])
+        if prices.far.shape[0] > 0:
+            around = apart(row * prices.cols + col, to_row * prices.cols + to_col, prices.far) / STRAIGHT
+            seconds = max(seconds, around * min(prices.axis[0], prices.axis[2]))
     return float(seconds)
 
 

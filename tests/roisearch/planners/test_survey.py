@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from roisearch import Belief, FieldOfView, Motion, SearchState, make_planner
 from roisearch.directions import direction_between, direction_index, moves_allowed
-from roisearch.planners.lanes import CORNERS, lawnmower, lawnmowers
+from roisearch.planners.lanes import CORNERS, lanes_over, lawnmower, lawnmowers
 from roisearch.planners.ways import Ways
 from roisearch.watch import LOOKED
 
@@ -28,6 +28,20 @@ def test_a_lawnmower_enters_every_wanted_cell_once(
 ) -> None:
     order = lawnmower(wanted, np.ones_like(wanted), turned, corner)
     assert sorted(order.tolist()) == np.flatnonzero(wanted).tolist()
+
+
+@settings(deadline=None, max_examples=80)
+@given(MASKS, st.sampled_from([2, 3, 5]), st.data())
+def test_with_a_wide_view_all_that_is_wanted_is_seen_from_the_lanes(
+    flyable: NDArray[np.bool_], swath: int, data: st.DataObject
+) -> None:
+    """Where the middle of a swath was not flyable, what lies beside it was never seen."""
+    wanted = data.draw(hnp.arrays(np.bool_, flyable.shape))
+    flown, half = lanes_over(wanted, flyable, swath), (swath - 1) // 2
+    assert not (flown & ~flyable).any()
+    for row, col in np.argwhere(wanted).tolist():
+        near = slice(max(0, row - half), row + half + 1)
+        assert flown[near, col].any() or not flyable[near, col].any()
 
 
 def test_lanes_of_an_open_area_follow_each_other_without_a_jump() -> None:

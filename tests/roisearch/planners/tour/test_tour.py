@@ -380,3 +380,31 @@ def test_a_tour_begins_where_the_aircraft_is_when_it_is_far_from_where_it_was() 
     planner.plan(belief, SearchState((0, 0), "east"), rng)
     planner.plan(belief, SearchState((39, 39), "north"), rng)
     assert all(max(cell) > 35 for cell in planner.ahead(30))
+
+
+@pytest.mark.parametrize(("seen", "share"), [(0.0, 0.5), (0.0, 0.99), (0.05, 0.7)])
+def test_what_no_look_will_find_does_not_hurry_the_tour(seen: float, share: float) -> None:
+    """A wood, a ridge's far side: its mass was charged at the tour's end, and the likely cells were no longer first."""
+    visibility = np.ones((14, 28))
+    visibility[:, 14:] = seen
+    here = np.zeros((14, 28))
+    here[:, :14] = hill(14, 14) + 0.002
+    here /= here.sum()
+    wood = np.zeros((14, 28))
+    wood[:, 14:] = 1.0 / 196
+    times = []
+    for prior in (here, (1.0 - share) * here + share * wood):
+        fov = FieldOfView.point(0.9, 0.9)
+        planner = TourPlanner(TourSettings(first=100), fov=fov, motion=MOTION, visibility=visibility)
+        belief, state, rng = Belief(prior), SearchState((0, 0), "south"), np.random.default_rng(1)
+        path = []
+        while len(path) < 120:
+            path += planner.plan(belief, state, rng).path[:16]
+            for cell in path[-16:]:
+                belief.observe([cell], False, 0.1 + 0.8 * visibility[cell], 0.9)
+            state = SearchState(path[-1], direction_between(path[-2], path[-1]), MOTION.speed_mps)
+        arrivals = MOTION.arrivals(path, (0, 0), "south").tolist()
+        entered = dict(reversed([*zip(path, arrivals, strict=True)]))
+        likely = [cell for cell in np.ndindex(14, 14) if here[cell] > np.median(here[:, :14])]
+        times.append(float(np.mean([entered.get(cell, 400.0) for cell in likely])))
+    assert times[1] < 1.25 * times[0]

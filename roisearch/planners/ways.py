@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from roisearch.directions import STEPS, moves_allowed
 from roisearch.motion import Motion
 
+MOST_KEPT = 4096
+"""Ways that are kept; then they are looked for anew."""
+
 
 class Ways:
     """The moves that the ground allows, and ways from cell to cell; cells are flat, row * cols + col.
@@ -27,6 +30,7 @@ class Ways:
         self.diagonal = diagonal
         self.is_open = bool(flyable.all())
         self.allowed: NDArray[np.uint8] = np.ascontiguousarray(moves_allowed(flyable, diagonal).ravel())
+        self._found: dict[tuple[int, int], list[int]] = {}  # ways around, which are asked for again and again
 
     def move(self, direction: int) -> int:
         """What a step in one of eight directions adds to a cell's number."""
@@ -63,6 +67,14 @@ class Ways:
         return path
 
     def _around(self, here: int, there: int) -> list[int]:
+        """The shortest way, as it was found before or is now."""
+        if (here, there) not in self._found:
+            if len(self._found) >= MOST_KEPT:
+                self._found.clear()
+            self._found[here, there] = self._search(here, there)
+        return list(self._found[here, there])
+
+    def _search(self, here: int, there: int) -> list[int]:
         """The shortest way, A* with the octile distance as the estimate."""
         goal_row, goal_col = divmod(there, self.cols)
 

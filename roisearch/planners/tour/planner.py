@@ -36,6 +36,10 @@ DRIFTS = 400
 """How often a target may walk on before the tour is made anew: seldom, as a tour that was kept is the better one."""
 ASTRAY = 12
 """Cells beside its last path; from farther away the tour is made anew, not flown to."""
+LEISURE_S = 2.0
+"""With less time than this a decision neither chooses the best of the lawnmowers anew nor puts in looks one by one."""
+AT_ONCE = 64
+"""More cells than so many with news are taken in together where there is no leisure."""
 TIED = 0.99
 """Looks that are worth as much as this part of the least one that is planned are as good as it."""
 
@@ -140,6 +144,7 @@ class TourPlanner:
         self._p *= reach.ravel()
         self._hidden = np.flatnonzero(~part.viewable.ravel())
         self._far = NO_LANDMARKS
+        self._rank = np.zeros(0, dtype=np.int32)
         self._desk = Desk(self.settings.looks + 2 * BATCH, rows * cols, self._prices())
 
     def _prices(self) -> Prices:
@@ -162,7 +167,7 @@ class TourPlanner:
             self._load(belief, state, until)
             return
         if touched is None:
-            self._drift(belief, state)
+            self._drift(belief, state, until)
             return
         desk, cols = self._desk, belief.shape[1]
         flown = self._fly(state.cell[0] * cols + state.cell[1])
@@ -178,14 +183,17 @@ class TourPlanner:
         self._known[cells] = actual
         self._settle()
         wrong = (np.abs(actual - expected) > 0.25 * expected) & self._reach.ravel()[cells]
-        for cell in cells[wrong].tolist():
-            self._expect(belief, cell)
-        if wrong.any():
+        if wrong.sum() > AT_ONCE and not _at_leisure(until):
+            self._expect_all(belief, cells[wrong])
+        elif wrong.any():
+            for cell in cells[wrong].tolist():
+                self._expect(belief, cell)
             self._settle()
+        if wrong.any():
             self._idle = 0
         self._since += len(flown)
         if desk.size < self.settings.looks - BATCH:
-            self._carry_on(belief)
+            self._carry_on(belief, until)
 
     def _lost(self, cell: Cell, cols: int) -> bool:
         """Whether there is no tour that leads to `cell`, or nearly there."""
@@ -195,7 +203,7 @@ class TourPlanner:
         away = np.maximum(np.abs(rows - cell[0]), np.abs(columns - cell[1]))
         return bool(away.min() > ASTRAY)
 
-    def _drift(self, belief: Belief, state: SearchState) -> None:
+    def _drift(self, belief: Belief, state: SearchState, until: float) -> None:
         """The target has walked on: what all looks are worth has changed, and the tour leads where it did for now.
 
         Each look of the tour is worth what is there by now; ground that has filled up is looked at again.
@@ -221,7 +229,7 @@ class TourPlanner:
             desk.insert(cell, float(worth[cell]))
         self._settle()
         if desk.size < self.settings.looks - BATCH:
-            self._carry_on(belief)
+            self._carry_on(belief, until)
 
     def _found_of(self, cells: Ints | slice) -> NDArray[np.float64]:
         """What part of the mass of `cells` can be found: of what more looks than are ever planned would still miss,
@@ -282,6 +290,20 @@ class TourPlanner:
                 desk.insert(cell, worth)
             worth *= 1.0 - float(self._p[cell])
 
+    def _expect_all(self, belief: Belief, cells: Ints) -> None:
+        """The same for many cells at once, roughly: looks stay where they are, and new ones come at the end. A better
+        tour is to be made in its place."""
+        desk, worth = self._desk, self._p[cells] * belief.weights[cells]
+        for i in np.argsort(-worth, kind="stable").tolist():
+            looks, left = desk.looks_at(int(cells[i])), float(worth[i])
+            for node in looks:
+                desk.tour.worth[node] = left
+                left *= 1.0 - float(self._p[cells[i]])
+            if not looks and left > self._least and desk.space > 0:
+                desk.append(int(cells[i]), left)
+        self.hasty = True
+        self._settle()
+
     # What to look at
 
     def _load(self, belief: Belief, state: SearchState, until: float) -> None:
@@ -297,7 +319,7 @@ class TourPlanner:
         desk = self._desk
         desk.clear()
         desk.stand(state.cell, direction_index(state.heading))
-        self._reserve = self._ranked(belief)
+        self._reserve = self._ranked(belief, until)
         self._least = 0.0
         self._add(belief, self.settings.looks)
         self._settle()
@@ -325,7 +347,7 @@ class TourPlanner:
         if spells > 0 and desk.lawnmowers:
             keep_up(desk, desk.lawnmowers, self._heat(1.0), self._random, until, spell_s / s.proposals)
 
-    def _ranked(self, belief: Belief) -> Ints:
+    def _ranked(self, belief: Belief, until: float) -> Ints:
         """The cells to look at, the best first, those about equally good in the order of a lawnmower: int [n].
 
         A cell that is worth it stands there for each further look as well.
@@ -338,11 +360,7 @@ class TourPlanner:
         cells = np.flatnonzero((worth >= TIED * least) & (worth > 0.0))
         if not cells.size:
             return cells
-        wanted = np.zeros(self._reach.shape, dtype=bool)
-        wanted.ravel()[cells] = True
-        rank = np.zeros(worth.size, dtype=np.int64)
-        order = self._best_lawnmower(belief, wanted)
-        rank[order] = np.arange(order.size)
+        rank = self._along_lanes(belief, cells, until)
         looks = [(cells, worth[cells])]
         for _ in range(1, MOST_LOOKS):
             further = looks[-1][1] * (1.0 - self._p[looks[-1][0]])
@@ -351,6 +369,21 @@ class TourPlanner:
         every = np.concatenate([c for c, _ in looks])
         band = np.round(np.log(np.concatenate([w for _, w in looks])) / -np.log(TIED))
         return every[np.lexsort((rank[every], -band))][:most]
+
+    def _along_lanes(self, belief: Belief, wanted: Ints, until: float) -> NDArray[np.int32]:
+        """When each cell's turn comes along the best lawnmower over the cells that are `wanted`, int [cells]; where
+        there is no leisure, along the last one that was chosen, or any."""
+        if _at_leisure(until):
+            there = np.zeros(self._reach.shape, dtype=bool)
+            there.ravel()[wanted] = True
+            order = self._best_lawnmower(belief, there)
+            self._rank = np.zeros(there.size, dtype=np.int32)
+            self._rank[order] = np.arange(order.size)
+        elif not self._rank.size:
+            there_and_back = np.arange(self._reach.size, dtype=np.int32).reshape(self._reach.shape)
+            there_and_back[1::2] = there_and_back[1::2, ::-1].copy()
+            return there_and_back.ravel()
+        return self._rank
 
     def _best_lawnmower(self, belief: Belief, wanted: NDArray[np.bool_]) -> Ints:
         """The lawnmower over what is wanted with which the target is expected soonest, flat cells."""
@@ -375,10 +408,10 @@ class TourPlanner:
         if np.isfinite(worst):
             self._least = worst
 
-    def _carry_on(self, belief: Belief) -> None:
+    def _carry_on(self, belief: Belief, until: float) -> None:
         """Put the next best looks at the end of the tour."""
         if self._reserve.size < BATCH and (self._since >= BATCH or self._desk.size == 0):
-            self._reserve, self._since = self._ranked(belief), 0
+            self._reserve, self._since = self._ranked(belief, until), 0
         if self._reserve.size == 0:
             return
         self._add(belief, BATCH)
@@ -477,6 +510,10 @@ class TourPlanner:
             self._fov,
             progress,
         )
+
+
+def _at_leisure(until: float) -> bool:
+    return until - time.perf_counter() >= LEISURE_S
 
 
 def _repeats(cells: Ints) -> Ints:

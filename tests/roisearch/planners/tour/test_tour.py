@@ -20,6 +20,7 @@ from roisearch.planners.tour.planner import TourPlanner
 from roisearch.planners.tour.settings import TourSettings
 from roisearch.planners.tour.starts import PLAIN, swept
 from roisearch.planners.tour.tour import price
+from roisearch.planners.ways import Ways
 
 MOTION = Motion(cell_m=25.0)
 QUICK = TourSettings(looks=300, first=5, proposals=2000)
@@ -408,3 +409,36 @@ def test_what_no_look_will_find_does_not_hurry_the_tour(seen: float, share: floa
         likely = [cell for cell in np.ndindex(14, 14) if here[cell] > np.median(here[:, :14])]
         times.append(float(np.mean([entered.get(cell, 400.0) for cell in likely])))
     assert times[1] < 1.25 * times[0]
+
+
+def test_news_of_many_cells_are_taken_in_at_once_where_there_is_no_leisure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A withdrawn "searched" held a decision of 38 ms up for 0.8 s, and no better tour was made beside the flight."""
+    searched = np.argwhere(np.indices((30, 30))[0] < 6)
+    belief, rng, state = Belief(np.ones((30, 30))), np.random.default_rng(0), SearchState((20, 20))
+    belief.observe(searched, np.zeros(len(searched), dtype=bool), 0.9, 1.0)
+    planner = TourPlanner(TourSettings(looks=1200, first=1), fov=FieldOfView.point(0.9, 0.9), motion=MOTION)
+    planner.plan(belief, state, rng)
+    assert not planner.hasty
+    monkeypatch.setattr(Desk, "insert", lambda *_: pytest.fail("one by one"))
+    withdrawn = Belief(np.ones((30, 30)))
+    decision = planner.plan(withdrawn, state, rng, deadline_s=0.038)
+    assert decision.path
+    assert planner.hasty
+    desk = planner._desk
+    for row, col in searched.tolist():
+        first, *_ = desk.looks_at(row * 30 + col)
+        assert desk.tour.worth[first] == pytest.approx(0.9 * withdrawn.weights[row * 30 + col])
+
+
+def test_a_way_around_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    wall = np.ones((9, 9), dtype=bool)
+    wall[1:8, 4] = False
+    ways = Ways(wall, diagonal=True)
+    found = ways.way(4 * 9 + 2, 4 * 9 + 6)
+    monkeypatch.setattr(Ways, "_search", lambda *_: pytest.fail("again"))
+    again = ways.way(4 * 9 + 2, 4 * 9 + 6)
+    assert again == found
+    again.clear()
+    assert ways.way(4 * 9 + 2, 4 * 9 + 6) == found

@@ -165,9 +165,11 @@ def run_report(squad: Squad, area: str, settings: Settings, began: float) -> dic
 
 
 def _ended(missions: Sequence[Mission]) -> Mission:
-    """The mission whose end is that of the run: the first that has searched to the end, else the first."""
-    done = (each for each in missions if each.state == State.DONE and each.standing.searched)
-    return next(done, missions[0])
+    """The mission whose end is that of the run: the first that has searched to the end, else the first that flew, else
+    the first."""
+    done = [each for each in missions if each.state == State.DONE and each.standing.searched]
+    flew = [each for each in missions if each.flight.began is not None]
+    return next(iter([*done, *flew, *missions]))
 
 
 def aircraft_report(name: str, mission: Mission) -> dict[str, Any]:

@@ -39,7 +39,7 @@ from service.rows import (
     WithdrawnRow,
 )
 from service.search import Search
-from service.story import FlightSoFar
+from service.story import IN_THE_AIR, FlightSoFar
 from service.survey import AREA, JOURNAL, PRIOR, is_of, read_survey, survey
 
 log = logging.getLogger("roisearch")
@@ -313,15 +313,23 @@ def left_system_id(journal: Path, whose: Whose, asked: int | None) -> int | None
     """The MAVLink system id of the aircraft that a journal's run goes on with; None: of the next one heard.
 
     As an operator has ordered, where one was replaced by another; as the settings have it (`asked`) otherwise, and
-    where they say since then over which link it is, or which one.
+    where they say since then over which link it is, or which one. Of several, one that was left in the air is the one
+    that it was: another one that answers on its link, where two were exchanged, is not flown in its place.
     """
-    wanted = asked
-    for entry in read_entries(journal, ReplacedRow, ResumedRow):
-        if isinstance(entry.said, ReplacedRow) and entry in whose:
-            wanted = entry.said.system_id
-        elif isinstance(entry.said, ResumedRow) and not _SAY_WHICH.isdisjoint(entry.said.changed):
-            wanted = asked
-    return wanted
+    wanted, aloft, flew = asked, False, None
+    for entry in read_entries(journal, ReplacedRow, ResumedRow, VehicleRow, TransitionRow):
+        if isinstance(entry.said, ResumedRow):
+            if not _SAY_WHICH.isdisjoint(entry.said.changed):
+                wanted, flew = asked, None
+        elif entry not in whose:
+            continue
+        elif isinstance(entry.said, ReplacedRow):
+            wanted, flew = entry.said.system_id, None
+        elif isinstance(entry.said, VehicleRow):
+            flew = entry.said.system_id
+        elif isinstance(entry.said, TransitionRow) and entry.said.after not in (State.WAITING, State.READY):
+            aloft = entry.said.after in (*IN_THE_AIR, State.YIELDED)
+    return flew if aloft and whose.aircraft and flew is not None else wanted
 
 
 def interrupted_run(parent: Path, area_file: Path, settings: Settings) -> tuple[Path | None, str]:

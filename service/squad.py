@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import Sequence
 
 from service.config import ONLY, Settings, name_of
@@ -50,10 +51,12 @@ class Squad:
 
     @property
     def leading(self) -> Mission:
-        """The first that has not ended; when all have, the first that came home, or else the first."""
+        """The first that has been heard and has not ended, else the first that has not; when all have, the first that
+        came home, or else the first."""
         every = list(self.missions.values())
         left = [each for each in every if each.state not in FINAL]
-        return next(iter([*left, *(each for each in every if each.state == State.DONE), *every]))
+        heard = [each for each in left if each.state != State.WAITING]
+        return next(iter([*heard, *left, *(each for each in every if each.state == State.DONE), *every]))
 
     @property
     def several(self) -> bool:
@@ -122,10 +125,11 @@ class Squad:
     async def _leave_the_lost(self) -> None:
         """When all others have ended, do not wait for one that is not heard any more."""
         clock = next(iter(self.missions.values())).clock
+        begun = clock.now()
         while True:
             await clock.sleep(1.0)
             left = [each for each in self.missions.values() if each.state not in FINAL]
-            if 0 < len(left) < len(self.missions) and all(map(_lost, left)):
+            if 0 < len(left) < len(self.missions) and all(_lost(each, begun) for each in left):
                 for each in left:
                     log.error("%sit has been silent since all others have ended", each.called)
                     await each.leave("the autopilot is silent, and all others have ended")
@@ -246,10 +250,17 @@ class Squad:
         )
 
 
-def _lost(mission: Mission) -> bool:
-    """Silent for long; on the ground between two sorties it may be switched off, and is waited for as the settings
-    say."""
+def _lost(mission: Mission, begun: float) -> bool:
+    """Silent for long, since the run was `begun` at the earliest; on the ground between two sorties it may be switched
+    off, and is waited for as the settings say. One that has not been heard may be starting, and one that an earlier
+    process has left in the air is waited for as long as a battery lasts."""
     if mission.core.between_sorties:
         return False
-    age = mission.clock.now() - mission.vehicle.telemetry.heartbeat_time
-    return age > max(LOST_S, mission.core.terms.heartbeat_fresh_s)
+    told, settings = mission.vehicle.telemetry.heartbeat_time, mission.core.settings
+    patience_s = max(LOST_S, mission.core.terms.heartbeat_fresh_s)
+    if not math.isfinite(told):
+        aloft = mission.core.may_be_aloft
+        patience_s = (
+            settings.flight.full_battery_s if aloft else max(patience_s, settings.link.connect_timeout_s)
+        )
+    return mission.clock.now() - max(told, begun) > patience_s

@@ -216,10 +216,12 @@ class StoriesSoFar:
 
     @property
     def leading(self) -> FlightSoFar:
-        """That of the first that has not ended; when all have, of the first that came home, or else of the first."""
+        """That of the first that has been heard and has not ended, else of the first that has not; when all have, of
+        the first that came home, or else of the first."""
         every = list(self.flights.values())
         left = [each for each in every if not each.over]
-        return next(iter([*left, *(each for each in every if each.state == State.DONE), *every]))
+        heard = [each for each in left if each.state != State.WAITING]
+        return next(iter([*heard, *left, *(each for each in every if each.state == State.DONE), *every]))
 
     @property
     def found(self) -> Found | None:

@@ -83,7 +83,10 @@ def lay_over(values: dict[str, Any], tables: list[dict[str, Any]]) -> None:
         )
     values["aircraft"] = [{**table, **more} for table, more in zip(known, tables, strict=True)]
     if any("connect" in more for more in tables):
-        values.setdefault("link", {})["connect"] = ""
+        link = values.setdefault("link", {})
+        link["connect"] = ""
+        if alone := link.pop("system_id", None):  # it was the first one's, when that flew alone
+            values["aircraft"][0].setdefault("system_id", alone)
 
 
 def check_apart(settings: Settings, where: str) -> None:
@@ -106,6 +109,10 @@ def check_apart(settings: Settings, where: str) -> None:
         )
     if tables and settings.link.connect:
         raise BadInput(f"{where}: 'link.connect' is for one aircraft; give connect in each table of aircraft")
+    if len(tables) > 1 and settings.link.system_id:
+        raise BadInput(
+            f"{where}: 'link.system_id' is for one aircraft; give system_id in each table of aircraft"
+        )
     ids = {name: [str(table.system_id)] for name, table in tables.items() if table.system_id}
     for what, values in (
         ("connect", {name: [table.connect] for name, table in tables.items() if table.connect}),

@@ -271,12 +271,17 @@ class MissionCore:
         """What a person must know of the battery's level while nobody tells it, or nothing."""
         return self._untold.battery
 
+    @property
+    def may_be_aloft(self) -> bool:
+        """Whether an earlier process has left the aircraft in the air, for all that is known without hearing it."""
+        return may_be_aloft(self._flown_as, self.flight)
+
     def told(self, seen: Situation, now: float) -> Other:
         """This aircraft as the other aircraft of the search are to see it: in the air from when it is about to be, and
         as an earlier process left it there until it says where it is, or that its motors stand still."""
         t = seen.telemetry
         placed, stands = math.isfinite(t.position_time), math.isfinite(t.heartbeat_time) and not aloft(t)
-        if not placed and not stands and may_be_aloft(self._flown_as, self.flight):
+        if not placed and not stands and self.may_be_aloft:
             climbs = self._flown_as.state == State.TAKEOFF
             return self.helm.traffic.unheard(t, now, self.flight, climbs=climbs)
         standing, heard = self.standing, now - t.heartbeat_time < self.terms.heartbeat_fresh_s

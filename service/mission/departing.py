@@ -71,7 +71,11 @@ class Waiting(Phase):
             if look.now >= self._not_before:
                 self._asked = True
                 yield Connect()
-        elif self._until is not None and (t.landed_state != "undefined" or look.now >= self._until):
+        elif self._until is None:
+            waited_s = look.now - (self._since or look.now)
+            if waited_s > look.settings.link.connect_timeout_s + RETRY_S and _others_heard(look):
+                yield from self._go_without("it is not heard")  # the link itself waits for it
+        elif t.landed_state != "undefined" or look.now >= self._until:
             yield Happen(Event.LINKED, f"{t.autopilot} is ready")
 
     def on(self, news: News, look: Look) -> Iterator[Wish]:
@@ -83,18 +87,27 @@ class Waiting(Phase):
         elif isinstance(news, Failed):
             waited_s = look.now - (self._since or look.now)
             between = self._between and waited_s <= look.settings.run.next_sortie_within_s
-            others = [each for each in look.seen.others if each.system_id is not None and not each.ended]
-            if not between and not others:
+            if not between and not _others_heard(look):
                 yield GiveUp(news.reason)
                 return
             self._asked, self._not_before = False, look.now + RETRY_S
             if between:
                 yield Note(f"the next sortie's aircraft is still waited for: {news.reason}")
-            elif not self._late:
-                self._late = True
-                said = f"{news.reason}; the others go on, and it may join them later"
-                yield Note(said, logging.WARNING)
-                yield Stay(said)
+            else:
+                yield from self._go_without(news.reason)
+
+    def _go_without(self, why: str) -> Iterator[Wish]:
+        """The others go on, and nobody reckons with this one any more; said once."""
+        if not self._late:
+            self._late = True
+            said = f"{why}; the others go on, and it may join them later"
+            yield Note(said, logging.WARNING)
+            yield Stay(said)
+
+
+def _others_heard(look: Look) -> bool:
+    """Whether another aircraft of the search is heard, or was, and may fly."""
+    return any(each.system_id is not None and not each.ended for each in look.seen.others)
 
 
 class Lacks:
@@ -137,11 +150,12 @@ class Handover:
         if low:
             yield EnterGuided(there=True)
             return
-        why, before = look.helm.unfit(t, look.seen.others), self._unfit
-        self._unfit = why
-        if why and left_aloft and look.helm.no_way_home(t, look.seen.others):
+        unfit, before = look.helm.unfit(t, look.seen.others), self._unfit
+        uneven = look.helm.traffic.uneven(t, look.seen.others)
+        why = self._unfit = unfit or uneven
+        if why and left_aloft and not look.helm.traffic.twin(t, look.seen.others):
             yield Hold("operator", why)
-        elif why and not self._between:
+        elif unfit and not self._between:
             yield GiveUp(why)
         elif why:
             if not before:
@@ -201,6 +215,9 @@ class Ready(Phase):
         t, terms = look.seen.telemetry, look.terms
         down, why_left = on_ground(t), self._left.why.removeprefix(f"{AS_LEFT}: ")
         as_left = f"{AS_LEFT}: {why_left}"
+        if twin := look.helm.traffic.twin(t, look.seen.others):  # whatever this one was: it is another one's
+            yield GiveUp(twin)
+            return
         if down:
             yield Stand()
         elif look.flight.flown:

@@ -171,6 +171,8 @@ def _refusal(command: str, look: Look) -> str:
         return why
     resumes = command == "resume" and look.standing.state in (State.YIELDED, State.HOLDING)
     takes = command == "launch" or resumes or (command == "return" and _taken_home(look))
+    if takes and (twin := look.helm.traffic.twin(t, look.seen.others)):
+        return twin
     if takes and (t.sticks or 0.0) > STICKS:
         return "the pilot's sticks are not in the middle; the pilot has the aircraft"
     if command == "launch":

@@ -161,7 +161,7 @@ class Traffic:
             tuple(home_m + height for _, height in goals),
             age_s=now - at,
             steered=False,
-            system_id=t.system_id,
+            system_id=t.system_id or None,
         )
 
     def _own(self, t: Telemetry, now: float) -> Other:
@@ -187,7 +187,7 @@ class Traffic:
             tuple(up for _, up in goals),
             age_s=now - t.position_time,
             claim=self._claim if now - self._claimed_at <= CLAIM_S else None,
-            system_id=t.system_id,
+            system_id=t.system_id or None,
             home_amsl_m=t.home_alt_amsl_m,
         )
 

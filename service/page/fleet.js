@@ -3,6 +3,7 @@
 import { $, make, say } from "./dom.js";
 import { give } from "./orders.js";
 
+export const FINAL = ["DONE", "ABORTED"];
 const ORDERS = ["hold", "resume", "return", "launch", "replace"];
 export const COLOURS = 8; // that style.css has
 
@@ -14,6 +15,7 @@ export const several = (state) => (state.aircraft ?? []).length > 1;
  * @property {any} whole
  * @property {any} chip
  * @property {any} next
+ * @property {any} why
  * @property {any[]} facts
  * @property {any[]} buttons */
 
@@ -25,6 +27,7 @@ const panels = new Map();
 function made({ name, colour }) {
   const chip = make("span", { className: "chip" }),
     next = make("p", { className: "small" }),
+    why = make("p", { className: "small" }),
     facts = ["Battery", "Height", "Link"].map((title) =>
       make("div", {}, make("dt", { textContent: title }), make("dd")),
     );
@@ -38,9 +41,9 @@ function made({ name, colour }) {
   });
   const title = make("h3", {}, make("span", { className: "swatch" }), `Aircraft ${name} `, chip);
   const group = make("div", { className: "buttons" }, ...buttons);
-  const whole = make("li", {}, title, next, make("dl", {}, ...facts), group);
+  const whole = make("li", {}, title, next, why, make("dl", {}, ...facts), group);
   whole.dataset.colour = String(colour % COLOURS);
-  return { whole, chip, next, facts: facts.map((fact) => fact.lastChild), buttons };
+  return { whole, chip, next, why, facts: facts.map((fact) => fact.lastChild), buttons };
 }
 
 /** What is told of its link, and how bad that is.
@@ -67,7 +70,8 @@ const told = ({ battery, height, link }) => [
 function fill(panel, craft, mayOrder) {
   say(panel.chip, craft.words);
   panel.chip.dataset.state = craft.state;
-  say(panel.next, craft.next.words || craft.why);
+  say(panel.next, FINAL.includes(craft.state) ? "This aircraft flies no more" : craft.next.words);
+  say(panel.why, craft.state === "SEARCHING" ? "" : craft.why);
   told(craft).forEach(([value, how], i) => {
     say(panel.facts[i], value);
     panel.facts[i].className = how;

@@ -2,7 +2,7 @@
 
 import { alertOf } from "./alerts.js";
 import { $, placeOf, say } from "./dom.js";
-import { several, showFleet, stillFleet } from "./fleet.js";
+import { FINAL, several, showFleet, stillFleet } from "./fleet.js";
 import { showFound, stillFound } from "./found.js";
 import { showLayers, showLegend, showScale } from "./layers.js";
 import { Events, hasToken, keepToken } from "./link.js";
@@ -17,7 +17,6 @@ import { forgetSuspects, goToSuspects, showSuspects, stillSuspects } from "./sus
 import { follow, placeTools, uncover } from "./tools.js";
 
 const SAME_CELLS = 2; // so far may a detection move and still be the same
-const FINAL = ["DONE", "ABORTED"];
 
 /** @type {Run | null} */
 let run = null;

@@ -49,7 +49,7 @@ def fly_three(search: Scripted, **third: Any) -> None:
     three = [
         craft(search, 1, State.SEARCHING),
         craft(search, 2, State.SEARCHING, battery=19.0),
-        craft(search, 3, State.HOLDING, **third),
+        craft(search, 3, third.pop("state", State.HOLDING), **third),
     ]
     search.tell(aircraft=three)
     search.tracks = [[(lat - 0.0006, lon), (lat - 0.0003, lon + 0.0006), (lat, lon)] for lat, lon in PLACES]
@@ -96,6 +96,11 @@ def test_each_aircraft_has_a_panel_with_its_state_battery_and_height(watch: Watc
         height=None,
     )
     expect(panel(watch, "3")).to_contain_text("BatteryunknownHeightunknownLinklost")
+    fly_three(search.run, why="the pilot or the autopilot selected LOITER")
+    expect(panel(watch, "3")).to_contain_text("the pilot or the autopilot selected LOITER")
+    fly_three(search.run, state=State.ABORTED, why="home is 20 m higher than that of 1")
+    expect(panel(watch, "3")).to_contain_text("This aircraft flies no more")
+    expect(panel(watch, "3")).to_contain_text("home is 20 m higher than that of 1")
     colours = watch.page.locator("#fleet .swatch").evaluate_all(
         "(all) => all.map((each) => getComputedStyle(each).backgroundColor)"
     )

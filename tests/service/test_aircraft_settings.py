@@ -86,6 +86,10 @@ def test_without_tables_one_flies_with_the_settings_as_they_are() -> None:
             "aircraft 'north' and '2' fly 6 m apart in height, which is less than the 7 m that two layers need",
         ),
         (("altitude_m = 40", 'altitude_m = 40\n[link]\nconnect = "udpin://:1"'), "'link.connect' is for one"),
+        (
+            ("altitude_m = 40", "altitude_m = 40\n[link]\nsystem_id = 3"),
+            "'link.system_id' is for one aircraft",
+        ),
         (("speed_mps", "speed"), "there is no setting 'speed' of an aircraft; there is name, connect"),
     ],
 )

@@ -195,6 +195,22 @@ def test_who_flew_what_and_how_far_the_rows_tell_is_taken_up(tmp_path: Path) -> 
     assert flight.left_sortie_row(0.25, "it landed") is None
 
 
+def test_of_several_one_that_was_left_in_the_air_is_the_one_that_it_was(
+    tmp_path: Path,
+) -> None:
+    """Two radios were exchanged with the restart: the one that a person held was found hovering, and flown on."""
+    heard = ("vehicle", {"system_id": 4, "autopilot": "px4", "aircraft": "south"})
+    landed = [*UP, ("SEARCHING", "landed", "DONE")]
+    for number, (moves, wanted) in enumerate(((UP, 4), (landed, None), (UP[:1], None))):
+        steps = [
+            ("transition", {"from": before, "event": event, "to": to, "reason": "so", "aircraft": "south"})
+            for before, event, to in moves
+        ]
+        journal = journal_of(tmp_path / str(number), [], heard, *steps)
+        assert left_system_id(journal, Whose("south", first=False), None) == wanted
+        assert left_system_id(journal, Whose("north", first=True), None) is None
+
+
 REPLACED = {"system_id": 7, "was_system_id": 1, "was_autopilot": "px4"}
 
 

@@ -224,6 +224,16 @@ def test_of_the_only_aircraft_is_every_report() -> None:
     assert [each.status for each in receipts] == ["accepted", "accepted"]
 
 
+def test_one_that_is_not_heard_yet_leads_nobody_who_flies() -> None:
+    """It was switched off, and the page said for the whole run that the aircraft is waited for."""
+    search = Search(GRID, SETTINGS)
+    late, flies = StandIn("1", search, State.WAITING), StandIn("2", search, State.SEARCHING)
+    both = squad(late, flies)
+    assert both.leading is flies
+    flies.state = State.WAITING
+    assert both.leading is late
+
+
 def test_the_first_that_has_not_ended_leads_and_the_run_ends_with_the_last() -> None:
     north, south, both = two(State.DONE, State.SEARCHING)
     assert both.leading is south  # type: ignore[comparison-overlap]
@@ -259,11 +269,26 @@ def test_one_that_does_not_search_has_given_its_share_back(state: State, given: 
 class Silent(StandIn):
     """A mission that goes on for as long as it is let, with an aircraft that is not heard any more."""
 
-    def __init__(self, name: str, search: Search, state: State, *, between: bool = False) -> None:
+    def __init__(
+        self,
+        name: str,
+        search: Search,
+        state: State,
+        *,
+        between: bool = False,
+        heard: bool = True,
+        aloft: bool = False,
+    ) -> None:
         super().__init__(name, search, state)
         self.clock = Clock(200.0)
-        self.vehicle = SimpleNamespace(telemetry=Telemetry())
-        self.core = SimpleNamespace(terms=Terms(), between_sorties=between)
+        told = Telemetry(heartbeat_time=self.clock.now()) if heard else Telemetry()
+        self.vehicle = SimpleNamespace(telemetry=told)
+        settings = SETTINGS.model_copy(
+            update={"flight": SETTINGS.flight.model_copy(update={"full_battery_s": 1200.0})}
+        )
+        self.core = SimpleNamespace(
+            terms=Terms(), between_sorties=between, settings=settings, may_be_aloft=aloft
+        )
         self.gone = asyncio.Event()
 
     async def run(self) -> None:
@@ -279,26 +304,28 @@ class Silent(StandIn):
 
 
 @pytest.mark.parametrize(
-    ("state", "between", "left"),
+    ("state", "how", "after_s"),
     [
-        (State.SEARCHING, False, True),
-        (State.WAITING, False, True),
-        (State.GROUNDED, True, False),
-        (State.WAITING, True, False),  # an earlier process left it between two sorties
+        (State.SEARCHING, {}, 30.0),
+        (State.WAITING, {"heard": False}, 120.0),  # it may be starting still
+        (State.WAITING, {"heard": False, "aloft": True}, None),  # an earlier process left it in the air
+        (State.GROUNDED, {"between": True}, None),
+        (State.WAITING, {"between": True}, None),  # an earlier process left it between two sorties
     ],
 )
 def test_one_that_is_silent_when_all_others_have_ended_is_left_but_on_the_ground_it_may_be_switched_off(
-    state: State, between: bool, left: bool
+    state: State, how: dict[str, bool], after_s: float | None
 ) -> None:
     search = Search(GRID, SETTINGS)
-    north, south = Silent("north", search, State.DONE), Silent("south", search, state, between=between)
+    north, south = Silent("north", search, State.DONE), Silent("south", search, state, **how)
+    looks = [0]
 
     async def run() -> None:
-        looks, ticking = [0], north.clock.sleep
+        ticking = north.clock.sleep
 
         async def sleep(seconds: float) -> None:  # of who looks at them
             looks[0] += 1
-            if looks[0] == 5:
+            if looks[0] == 300:
                 south.end(State.DONE)
             await ticking(seconds)
 
@@ -306,7 +333,9 @@ def test_one_that_is_silent_when_all_others_have_ended_is_left_but_on_the_ground
         await squad(north, south).run()
 
     asyncio.run(run())
-    assert (south.state == State.ABORTED) == left
+    assert (south.state == State.ABORTED) == (after_s is not None)
+    if after_s is not None:  # a second and more between two looks
+        assert looks[0] <= after_s + 2.0
 
 
 class WithAHome(StandIn):

@@ -27,10 +27,12 @@ from service.mission.effects import (
 )
 from service.mission.news import Order
 from service.mission.phase import RETRY_S
+from service.mission.situation import Situation
+from service.mission.standing import Standing
 from service.mission.states import Event, State, next_state
 from service.rows import CommandRow
 from sim.soak import ground
-from tests.service.mission.flown import HERE, LEFT_US, ON_GROUND, Talk, reached
+from tests.service.mission.flown import HERE, LEFT_US, ON_GROUND, Talk, place, reached
 from tests.service.mission.test_grounded import grounded
 
 STEPS = [Connect(), WaitReady(), EnterGuided(), Arm(), TakeOff(15.0)]
@@ -132,6 +134,51 @@ def test_one_that_is_not_heard_may_join_the_others_later_and_is_taken_up_by_an_o
     assert (talk.state, talk.core.doing) == (State.READY, None)
     talk.on(Order("launch", 7))
     assert talk.doing() == WaitReady()
+
+
+def test_one_whose_link_itself_waits_joins_by_an_order_only_as_well() -> None:
+    """Its radio is plugged in an hour later; nothing had failed until then, and so nothing was late."""
+    talk = Talk(may_take_off=True, **ON_GROUND)
+    talk.sees(others=(Other("2", HERE, 60.0, HERE, HERE, 60.0, 8.0, system_id=2),))
+    talk.pass_by(200.0)
+    assert talk.core.standing.why == "it is not heard; the others go on, and it may join them later"
+    talk.done()
+    talk.pass_by(30.0)
+    assert (talk.state, talk.core.doing) == (State.READY, None)
+
+
+def test_who_was_never_heard_vouches_for_nobody() -> None:
+    """Two that are both switched off took each other for heard, and the run never ended."""
+    assert Talk().core.told(Situation(), 0.0).system_id is None
+
+
+def test_what_hovers_over_a_home_of_another_height_is_not_taken_over() -> None:
+    """Two that were taken up by hand, ten metres apart above their homes, were at one height above the sea."""
+    talk = Talk(**{**ON_GROUND, "in_control": False})
+    far = place(-100.0, -100.0)
+    talk.sees(others=(Other("2", far, 400.0, far, far, 400.0, 8.0, system_id=2, home_amsl_m=380.0),))
+    talk.tick()
+    talk.done()
+    talk.shows(landed_state="in_air", armed=True, guided=True, alt_home_m=15.0, alt_amsl_m=415.0)
+    talk.pass_by(10.0)
+    assert (talk.state, talk.core.doing) == (State.READY, None)
+    assert "it is not taken over: home is 20 m higher" in talk.core.standing.why
+    talk.sees(others=())
+    talk.pass_by(2.0)
+    assert talk.doing() == EnterGuided(there=True)
+
+
+@pytest.mark.parametrize("left", [State.HOLDING, State.YIELDED, State.SEARCHING])
+def test_another_missions_aircraft_is_not_taken_however_this_one_was_left(left: State) -> None:
+    """Held before it was heard, and heard over the other's radio: it would have had two masters."""
+    talk = Talk(standing=Standing(state=left), system_id=2, in_control=False)
+    talk.sees(others=(Other("2", HERE, 60.0, HERE, HERE, 60.0, 8.0, system_id=2),))
+    talk.tick()
+    talk.done()
+    talk.pass_by(3.0)
+    assert talk.state == State.ABORTED
+    assert "the same aircraft over two links" in talk.core.standing.why_stopped
+    assert not [effect for effect in talk.wanted if isinstance(effect, MOVES)]
 
 
 @pytest.mark.parametrize("changes", [{"system_id": None}, {"system_id": 2, "ended": True}])

@@ -18,11 +18,11 @@ def worth_a_look(search: Search, path: Sequence[Cell]) -> frozenset[Cell]:
     ground, where a look comes with every cell that is flown over."""
     if search.heights is None or not path:
         return frozenset()
-    worth = _worth(search, np.array(path, dtype=np.int64))
+    worth = likely(search, np.array(path, dtype=np.int64))
     return frozenset(cell for cell, is_worth in zip(path, worth.tolist(), strict=True) if is_worth)
 
 
-def _worth(search: Search, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+def likely(search: Search, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether cells [k, 2] are at least as likely as the mean, and can be seen: bool [k]."""
     mean = 1.0 / max(1, int(np.count_nonzero(search.grid.searchable)))
     hidden = search.common.overlooked.cells[cells[:, 0], cells[:, 1]]
@@ -47,7 +47,7 @@ def pays_to_hover(search: Search, cells: Sequence[Cell]) -> bool:
 def passed(search: Search, cell: Cell, heading: str, now: float) -> str:
     """The aircraft has entered a cell for a look; what follows for the plan, as a sentence, or nothing."""
     cells, _, _ = search.fov.looks(cell, heading, search.grid.frame.shape)
-    given_up = search.common.passed(cells[_worth(search, cells)], now)
+    given_up = search.common.passed(cells[likely(search, cells)], now)
     if not given_up:
         return ""
     ((lat, lon),) = search.grid.frame.to_latlon(np.array([cell]))

@@ -13,7 +13,7 @@ from service.area.model import TargetMotion
 from service.config import Settings
 from service.evidence.observe import Observation, Sighting
 from service.geometry import Cell
-from service.looking import _worth, passed, pays_to_hover, place_in_sight, worth_a_look
+from service.looking import likely, passed, pays_to_hover, place_in_sight, worth_a_look
 from service.search import Search
 from tests.service.mission.flown import CELL_M, GRID
 from tests.service.test_search import search
@@ -74,8 +74,8 @@ def test_a_look_is_worth_it_by_the_probability_however_much_was_looked_at_in_vai
     for _ in range(2):
         built.belief.observe(most, np.zeros(len(most), dtype=bool), 0.8, 0.99)
     assert built.belief.total < 0.3
-    likely = built.belief.probability()[cells[:, 0], cells[:, 1]] >= 1.0 / len(cells)
-    np.testing.assert_array_equal(_worth(built, cells), likely)
+    right = built.belief.probability()[cells[:, 0], cells[:, 1]] >= 1.0 / len(cells)
+    np.testing.assert_array_equal(likely(built, cells), right)
 
 
 def reported(built: Search, cell: Cell) -> None:

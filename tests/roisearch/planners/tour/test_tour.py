@@ -426,6 +426,7 @@ def test_news_of_many_cells_are_taken_in_at_once_where_there_is_no_leisure(
     decision = planner.plan(withdrawn, state, rng, deadline_s=0.038)
     assert decision.path
     assert planner.hasty
+    # what the looks are worth to it is told nowhere else
     desk = planner._desk
     for row, col in searched.tolist():
         first, *_ = desk.looks_at(row * 30 + col)
@@ -437,6 +438,7 @@ def test_a_way_around_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> Non
     wall[1:8, 4] = False
     ways = Ways(wall, diagonal=True)
     found = ways.way(4 * 9 + 2, 4 * 9 + 6)
+    # that it is not looked for again shows in nothing but the time
     monkeypatch.setattr(Ways, "_search", lambda *_: pytest.fail("again"))
     again = ways.way(4 * 9 + 2, 4 * 9 + 6)
     assert again == found

@@ -63,6 +63,7 @@ def lanes_over(wanted: NDArray[np.bool_], flyable: NDArray[np.bool_], swath: int
     if swath == 1:
         return wanted & flyable
     rows, half = wanted.shape[0], (swath - 1) // 2
+    beyond = swath - 1 - half  # a lane sees so many rows below it, and `half` above
     flown = np.zeros_like(wanted)
     for top in range(0, rows, swath):
         left, middle = wanted[top : top + swath].any(axis=0), min(top + half, rows - 1)
@@ -71,9 +72,9 @@ def lanes_over(wanted: NDArray[np.bool_], flyable: NDArray[np.bool_], swath: int
             left = left & ~flown[row]
     seen = np.zeros_like(wanted)
     for row in range(rows):
-        seen[row] = flown[max(0, row - half) : row + half + 1].any(axis=0)
+        seen[row] = flown[max(0, row - beyond) : row + half + 1].any(axis=0)
     for row, col in np.argwhere(wanted & ~seen).tolist():
-        near = [each for each in range(max(0, row - half), min(rows, row + half + 1)) if flyable[each, col]]
+        near = [each for each in range(max(0, row - beyond), min(rows, row + half + 1)) if flyable[each, col]]
         if near:
             flown[min(near, key=lambda each: abs(each - row)), col] = True
     return flown

@@ -40,8 +40,14 @@ def test_with_a_wide_view_all_that_is_wanted_is_seen_from_the_lanes(
     flown, half = lanes_over(wanted, flyable, swath), (swath - 1) // 2
     assert not (flown & ~flyable).any()
     for row, col in np.argwhere(wanted).tolist():
-        near = slice(max(0, row - half), row + half + 1)
+        near = slice(max(0, row - (swath - 1 - half)), row + half + 1)
         assert flown[near, col].any() or not flyable[near, col].any()
+
+
+@pytest.mark.parametrize("swath", [1, 2, 3, 4, 5])
+def test_over_open_ground_there_is_a_lane_a_swath(swath: int) -> None:
+    everywhere = np.ones((12, 4), dtype=bool)
+    assert lanes_over(everywhere, everywhere, swath).any(axis=1).sum() == -(-12 // swath)
 
 
 def test_lanes_of_an_open_area_follow_each_other_without_a_jump() -> None:

@@ -48,10 +48,16 @@ FLIGHTS = {
         "tests/sim/test_bench",
         "tests/typed/",
     ),
+    "late flights": (
+        "tests/integration/test_several",
+        "tests/integration/test_soak",
+        "tests/integration/test_strangers",
+    ),
     "last flights": ("tests/integration/",),
 }
 """Files whose tests keep time with other processes, and mostly wait: each of these is done by one worker, a test at a
-time, while another computes. They take about as long as each other and as all that is computed."""
+time, while another computes. The first two take about as long as each other and as all that is computed; the others
+come at the end, side by side."""
 COMPILES = ("tests/roisearch/", "tests/sim/trials/")
 """Files that need most kernels: begun when the flights have compiled them."""
 
@@ -71,14 +77,14 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
             return flown_with(nodeid) or nodeid.partition("::")[0]
 
         def _assign_work_unit(self, node: Any) -> None:
-            first, second, last = FLIGHTS
+            first, second, *last = FLIGHTS
             waiting = self.workqueue
             for name in [name for name in (second, first) if name in waiting]:
                 waiting.move_to_end(name, last=False)
             for name in [name for name in waiting if name.startswith(COMPILES)]:
                 waiting.move_to_end(name)
-            if last in waiting:
-                waiting.move_to_end(last)
+            for name in [name for name in last if name in waiting]:
+                waiting.move_to_end(name)
             super()._assign_work_unit(node)
 
     return TwoFly(config, log)

@@ -49,15 +49,11 @@ class References:
             if moved is None:
                 return self._with_the_position(now)
             return replace(moved, position_too=self._went_along(moved))
-        if (
-            message == "GLOBAL_POSITION_INT"
-            and self._note_jump(t, now)
-            and (moved := self._with_the_position(now))
-        ):
-            return moved
-        if message == "GLOBAL_POSITION_INT" and math.isfinite(t.alt_home_m):
-            place = Home(0.0, 0.0, t.alt_amsl_m - t.alt_home_m)
-            return self._look("sea level", place, now)
+        if message == "GLOBAL_POSITION_INT":
+            if self._note_jump(t, now) and (moved := self._with_the_position(now)):
+                return moved
+            if math.isfinite(t.alt_home_m):
+                return self._look("sea level", Home(0.0, 0.0, t.alt_amsl_m - t.alt_home_m), now)
         return None
 
     def _with_the_position(self, now: float) -> ReferenceMoved | None:

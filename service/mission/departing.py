@@ -235,11 +235,9 @@ class Ready(Phase):
             yield Note(
                 "it was on its way home: waiting until the aircraft is down, or hovers in the guided mode"
             )
-        elif why := look.helm.unfit(t, look.seen.others):
-            aloft = look.flight.flown and not down and look.helm.no_way_home(t, look.seen.others)
-            yield (
-                Hold("operator", why) if aloft else GiveUp(why)
-            )  # what flies is not left there until it falls
+        elif why := look.helm.no_way_home(t, look.seen.others):
+            aloft = look.flight.flown and not down  # which is not left there until it falls
+            yield Hold("operator", why) if aloft else GiveUp(why)
         elif down and terms.may_take_off and not order_needed(look):
             self._taking_off = True
             yield WaitReady()

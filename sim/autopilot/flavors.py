@@ -38,6 +38,7 @@ class Flavor:
     setpoint_mode: str  # the mode in which it follows a stream of setpoints
     pauses_by: int  # MAV_CMD with which a ground station has it pause
     # ---- when it does what
+    stamps_places: bool  # home and origin are told with the time at which they were set
     home_share: float  # of the time from boot to ready, until home is set
     landing_takes_s: float  # touch-down until ON_GROUND
     disarm_after_landing_s: float
@@ -121,6 +122,7 @@ PX4 = Flavor(
     failsafe_hold=("AUTO_LOITER", "Failsafe activated: entering Hold for 5 seconds"),
     setpoint_mode="OFFBOARD",
     pauses_by=M.MAV_CMD_DO_REPOSITION,
+    stamps_places=True,
     home_share=0.2,
     landing_takes_s=1.0,
     disarm_after_landing_s=2.0,
@@ -224,6 +226,7 @@ ARDUCOPTER = Flavor(
     failsafe_hold=("BRAKE", "Radio Failsafe"),
     setpoint_mode="GUIDED",
     pauses_by=M.MAV_CMD_DO_PAUSE_CONTINUE,
+    stamps_places=False,
     home_share=0.8,
     landing_takes_s=1.6,
     disarm_after_landing_s=0.5,

@@ -222,8 +222,8 @@ def gps_global_origin(a: Host) -> Any:
 
 
 def _set_at(a: Host, place: Point) -> int:
-    """PX4's stamp of home and origin is the time at which they were set: another one for another place only."""
-    return 1 + zlib.crc32(repr(place).encode()) if a.firmware.flavor.autopilot == M.MAV_AUTOPILOT_PX4 else 0
+    """The stamp of home or origin, for a flavour that gives one: another one for another place only."""
+    return 1 + zlib.crc32(repr(place).encode()) if a.firmware.flavor.stamps_places else 0
 
 
 def vfr_hud(a: Host) -> Any:

@@ -1,9 +1,8 @@
 """How long the way around is: distances from a few landmarks, from which those between any two cells follow.
 
 The way between two cells is never shorter than the difference of their distances from a third one. With landmarks far
-apart, at the ends of arms and valleys, one of the differences is nearly the way itself: the best known bound of this
-kind (Goldberg and Harrelson, "Computing the Shortest Path: A* Search Meets Graph Theory", SODA 2005). It costs two
-numbers a landmark, and no search.
+apart, at the ends of arms and valleys, one of the differences is nearly the way itself (Goldberg and Harrelson,
+"Computing the Shortest Path: A* Search Meets Graph Theory", SODA 2005). It costs two numbers a landmark, and no search.
 """
 
 from __future__ import annotations
